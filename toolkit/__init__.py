@@ -1,0 +1,53 @@
+"""pendulab's toolkit: from a video of a pendulum to fitted models and a report.
+
+All that is public is importable from here; each name is loaded when it is first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Camera": "scene",
+    "Environment": "scene",
+    "FitResult": "fit",
+    "FittedParameter": "fit",
+    "Finding": "checks.finding",
+    "JobError": "errors",
+    "Pendulum": "scene",
+    "PendulabError": "errors",
+    "Release": "scene",
+    "Scene": "scene",
+    "ThetaSeries": "series",
+    "Track": "track",
+    "Trajectory": "trajectory",
+    "UsageError": "errors",
+    "calibrate": "calibrate",
+    "diagnose": "diagnose",
+    "fit": "fit",
+    "fit_models": "fit",
+    "open_video": "video",
+    "read_series": "series_io",
+    "render": "render",
+    "report": "report",
+    "simulate": "simulate",
+    "track": "track",
+    "write_series": "series_io",
+}
+
+__all__ = sorted(_HOME)  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'toolkit' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"toolkit.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

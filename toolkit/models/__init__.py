@@ -1,0 +1,1 @@
+"""What is fitted: pendulum models with their free parameters."""

@@ -1,0 +1,1 @@
+"""Formats of θ(t) files, one file each."""

@@ -1,0 +1,1 @@
+"""Localisers of the bob, one file each."""

@@ -1,0 +1,61 @@
+"""Trajectory: what `simulate` returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from toolkit.series import ThetaSeries
+
+
+@dataclass(frozen=True)
+class SolveCost:
+    """What a solution cost: CPU seconds of the solve, of compiling (0 when cached), and evaluations made."""
+
+    cpu_s: float = 0.0
+    compile_s: float = 0.0
+    evaluations: int = 0
+    steps: int = 0
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at a time: `slack`, `taut`, `stick`, `slip` …"""
+
+    kind: str
+    t_s: float
+    theta_rad: float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The motion at given times; 1-D arrays of one length, SI units.
+
+    `method` names the route taken, `accuracy_rad` the largest error of θ that was asked for, `error_estimate_rad`
+    the one estimated. `tension_n` and `energy_j` are NaN where the mass is not known. `theta_rad` is continuous
+    (it grows past π when the pendulum goes over the top).
+    """
+
+    t_s: np.ndarray
+    theta_rad: np.ndarray
+    omega_rad_per_s: np.ndarray
+    tension_n: np.ndarray
+    energy_j: np.ndarray
+    method: str
+    cost: SolveCost = field(default_factory=SolveCost)
+    accuracy_rad: float = 1e-9
+    error_estimate_rad: float | None = None
+    events: tuple[Event, ...] = ()
+    warnings: tuple[str, ...] = ()
+    equation_latex: str = ""
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def series(self) -> ThetaSeries:
+        """The same θ(t) as a `ThetaSeries` without error bars."""
+        from toolkit.series import ThetaSeries
+
+        return ThetaSeries(self.t_s, self.theta_rad, None, meta={"source": "simulation", "method": self.method})
