@@ -42,3 +42,7 @@ class Track:
     def ok(self) -> np.ndarray:
         """(n,) bool: the frames on which the bob was measured."""
         return self.status == OK
+
+
+def track(video, *, progress=None):
+    raise NotImplementedError
