@@ -45,7 +45,9 @@ class ThetaSeries:
                     f"{name} must be one column as long as t_s, got shape {column.shape} for {np.shape(self.t_s)}"
                 )
             if not np.all(np.isfinite(column)):
-                raise UsageError(f"{name} holds {np.sum(~np.isfinite(column))} values that are not finite; leave those rows out")
+                raise UsageError(
+                    f"{name} holds {np.sum(~np.isfinite(column))} values that are not finite; leave those rows out"
+                )
             column.setflags(write=False)
             columns[name] = column
         if columns["t_s"].size == 0:

@@ -1,0 +1,558 @@
+"""The command `pendulab`: parse, call, print. No physics; heavy imports stay inside the commands."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from toolkit.analyse import Analysis
+    from toolkit.progress import Progress
+    from toolkit.scene import Scene
+
+app = typer.Typer(
+    name="pendulab",
+    help="From a phone video of a pendulum to θ(t) with error bars, fitted models, and a report.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results (made if need be).")]
+SceneFile = Annotated[Path | None, typer.Option("--scene", help="Scene file (TOML) with what is known.")]
+Mass = Annotated[float | None, typer.Option("--mass-kg", help="Mass of the bob in kg.")]
+Length = Annotated[float | None, typer.Option("--length-m", help="Length from pivot to bob centre in m.")]
+BobRadius = Annotated[float | None, typer.Option("--bob-radius-m", help="Radius of the bob in m.")]
+Gravity = Annotated[
+    float | None, typer.Option("--g", help="Gravitational acceleration in m/s² (default 9.80665).")
+]
+FpsFactor = Annotated[
+    float,
+    typer.Option(
+        "--fps-factor", help="Slow motion: how many times slower the clip plays (8 for 240 shown at 30)."
+    ),
+]
+PivotXY = Annotated[
+    str | None, typer.Option("--pivot", metavar="X,Y", help="Pivot in pixels, instead of finding it.")
+]
+BobXY = Annotated[
+    str | None, typer.Option("--bob", metavar="X,Y", help="Bob in the first frame used, in pixels.")
+]
+RadiusPx = Annotated[float | None, typer.Option("--radius", help="Radius of the bob in pixels.")]
+Start = Annotated[float | None, typer.Option("--start", help="Use the recording from this time on, in s.")]
+Stop = Annotated[float | None, typer.Option("--stop", help="Use the recording up to this time, in s.")]
+Lang = Annotated[str, typer.Option("--lang", help="Language of the report: en or th.")]
+Formats = Annotated[str, typer.Option("--format", help="Any of html,pdf,tex,md,xlsx, with commas.")]
+Models = Annotated[list[str] | None, typer.Option("--model", help="Fit this model only; may be given again.")]
+Overlay = Annotated[
+    bool, typer.Option("--overlay", help="Also write overlay.mp4: track, pivot and model on the video.")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="Fewer cases, in under a minute.")]
+
+
+@app.callback()
+def about(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)
+    ] = False,
+) -> None:
+    """From a phone video of a pendulum to θ(t) with error bars, fitted models, and a report."""
+    if version:
+        from importlib.metadata import version as installed
+
+        typer.echo(f"pendulab {installed('pendulab')}")
+        raise typer.Exit
+
+
+@app.command()
+def demo(out: Out = None, lang: Lang = "en") -> None:
+    """The main job on a shipped sample video; prints the report's path."""
+    from toolkit.samples import sample
+    from toolkit.scene import Scene
+
+    _report(
+        sample("pendulum.mp4"),
+        Scene.from_toml(sample("pendulum.toml")),
+        out or Path("pendulab-demo"),
+        formats=("html", "pdf"),
+        lang=lang,
+        overlay=True,
+    )
+
+
+@app.command()
+def track(
+    video: Path,
+    out: Out = None,
+    scene: SceneFile = None,
+    mass_kg: Mass = None,
+    length_m: Length = None,
+    bob_radius_m: BobRadius = None,
+    g: Gravity = None,
+    fps_factor: FpsFactor = 1.0,
+    pivot: PivotXY = None,
+    bob: BobXY = None,
+    radius: RadiusPx = None,
+    start: Start = None,
+    stop: Stop = None,
+    localiser: Annotated[
+        str | None, typer.Option("--localiser", help="Use this localiser (see `trackers`).")
+    ] = None,
+    overlay: Overlay = False,
+) -> None:
+    """Track the bob in VIDEO: track.csv, theta.csv, calibration.json."""
+    from toolkit.analyse import is_video, measure, write_measurement
+    from toolkit.errors import UsageError
+    from toolkit.output import whole_folder
+
+    known = _scene(scene, mass_kg, length_m, bob_radius_m, g)
+    if not is_video(video):
+        raise UsageError(
+            f"{video.name} is a θ(t) file, not a video: use `pendulab fit` or `pendulab report` on it"
+        )
+    out = out or Path(f"{video.stem}-track")
+    with _progress() as progress, whole_folder(out) as folder:
+        series, found = measure(
+            video, known, start_s=start, stop_s=stop, progress=progress, localiser=localiser,
+            **_tracking(pivot, bob, radius, fps_factor),
+        )  # fmt: skip
+        write_measurement(series, found, folder)
+        if overlay and found is not None:
+            from toolkit.overlay import write_overlay
+
+            write_overlay(video, found, folder / "overlay.mp4", progress=progress)
+    if found is not None:
+        typer.echo(
+            f"{int(found.ok.sum())} of {len(found.frame)} frames measured by the {found.localiser} localiser"
+        )
+    _print_warnings(series.meta.get("warnings", ()))
+    typer.echo(out / "theta.csv")
+
+
+@app.command()
+def fit(
+    series: Path,
+    out: Out = None,
+    scene: SceneFile = None,
+    mass_kg: Mass = None,
+    length_m: Length = None,
+    bob_radius_m: BobRadius = None,
+    g: Gravity = None,
+    fps_factor: FpsFactor = 1.0,
+    pivot: PivotXY = None,
+    bob: BobXY = None,
+    radius: RadiusPx = None,
+    start: Start = None,
+    stop: Stop = None,
+    model: Models = None,
+) -> None:
+    """Fit the models to a θ(t) file (or a video): fit.json, residuals.csv."""
+    from toolkit.analyse import analyse, write_analysis
+    from toolkit.output import whole_folder
+
+    known = _scene(scene, mass_kg, length_m, bob_radius_m, g)
+    measuring = _measuring(series, start, stop, pivot, bob, radius, fps_factor)
+    out = out or Path(f"{series.stem}-fit")
+    with _progress() as progress, whole_folder(out) as folder:
+        analysis = analyse(series, known, models=model, progress=progress, **measuring)
+        write_analysis(analysis, folder)
+    _print_analysis(analysis)
+    typer.echo(out / "fit.json")
+
+
+@app.command()
+def report(
+    recording: Annotated[Path, typer.Argument(metavar="VIDEO|SERIES")],
+    out: Out = None,
+    scene: SceneFile = None,
+    mass_kg: Mass = None,
+    length_m: Length = None,
+    bob_radius_m: BobRadius = None,
+    g: Gravity = None,
+    fps_factor: FpsFactor = 1.0,
+    pivot: PivotXY = None,
+    bob: BobXY = None,
+    radius: RadiusPx = None,
+    start: Start = None,
+    stop: Stop = None,
+    lang: Lang = "en",
+    format: Formats = "html,pdf",
+    model: Models = None,
+    overlay: Overlay = False,
+) -> None:
+    """The whole job on a video or a θ(t) file, with report.html and report.pdf."""
+    _report(
+        recording,
+        _scene(scene, mass_kg, length_m, bob_radius_m, g),
+        out or Path(f"{recording.stem}-report"),
+        formats=tuple(part.strip() for part in format.split(",") if part.strip()),
+        lang=lang,
+        overlay=overlay,
+        models=model,
+        **_measuring(recording, start, stop, pivot, bob, radius, fps_factor),
+    )
+
+
+@app.command()
+def simulate(
+    scene: Path,
+    out: Annotated[Path, typer.Option("--out", help="CSV file to write.")],
+    accuracy: Annotated[
+        float, typer.Option("--accuracy", help="Largest error of θ to allow, in rad.")
+    ] = 1e-9,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration-s", help="Default: the camera's, else 10 s.")
+    ] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate-hz", help="Default: the camera's fps, else 100 Hz.")
+    ] = None,
+) -> None:
+    """Solve the equation of motion of SCENE: t, θ, θ̇, tension, energy as CSV."""
+    import numpy as np
+
+    from toolkit.errors import UsageError
+    from toolkit.output import whole_file
+    from toolkit.scene import Scene
+    from toolkit.simulate import simulate as solve
+    from toolkit.simulate import write_trajectory_csv
+
+    known = Scene.from_toml(scene)
+    length = duration_s if duration_s is not None else (known.camera.duration_s if known.camera else 10.0)
+    rate = rate_hz if rate_hz is not None else (known.camera.fps if known.camera else 100.0)
+    if not length >= 0 or not rate > 0:
+        raise UsageError(f"--duration-s must be ≥ 0 and --rate-hz > 0, got {length} and {rate}")
+    if length * rate > 2e7:
+        raise UsageError(
+            f"{length:g} s at {rate:g} Hz is more than 20 million rows; lower --rate-hz or --duration-s"
+        )
+    with _progress() as progress:
+        progress("solving", 0.0)
+        trajectory = solve(known, np.arange(int(round(length * rate)) + 1) / rate, accuracy_rad=accuracy)
+        with whole_file(out) as unfinished:
+            write_trajectory_csv(trajectory, unfinished)
+    cost = trajectory.cost
+    typer.echo(
+        f"route: {trajectory.method}; {1e3 * cost.cpu_s:.3g} ms of CPU, {1e3 * cost.compile_s:.3g} ms of compiling"
+    )
+    if trajectory.error_estimate_rad is not None:
+        typer.echo(f"error of θ: about {trajectory.error_estimate_rad:.1e} rad ({accuracy:.1e} asked for)")
+    for event in trajectory.events[:20]:
+        typer.echo(f"{event.kind} at t = {event.t_s:.6g} s, θ = {event.theta_rad:.6g} rad")
+    _print_warnings(trajectory.warnings)
+    typer.echo(out)
+
+
+@app.command()
+def render(
+    scene: Path,
+    out: Annotated[
+        Path, typer.Option("--out", help="Video file to write; its truth goes to NAME.truth.csv.")
+    ],
+) -> None:
+    """Film SCENE: a synthetic video with its exact truth in a side-car."""
+    from toolkit.render import render as film
+    from toolkit.scene import Scene
+
+    with _progress() as progress:
+        film(Scene.from_toml(scene), out, progress=progress)
+    typer.echo(out)
+    typer.echo(out.with_name(f"{out.stem}.truth.csv"))
+
+
+@app.command()
+def cost(
+    what: Annotated[str, typer.Argument(metavar="integrators|tracking|fit")],
+    out: Out = None,
+    quick: Quick = False,
+) -> None:
+    """What accuracy costs in time: tables and plots, measured on this machine, beside public peers."""
+    import importlib
+
+    from toolkit import cost as rooms
+    from toolkit.errors import UsageError
+    from toolkit.output import whole_folder
+    from toolkit.registry import did_you_mean, part_names
+
+    if what not in part_names(rooms):
+        raise UsageError(f"unknown subject {what!r}{did_you_mean(what, part_names(rooms))}")
+    measure = importlib.import_module(f"toolkit.cost.{what}").measure
+    out = out or Path(f"cost-{what}")
+    with _progress() as progress, whole_folder(out) as folder:
+        text = measure(folder, quick=quick, progress=progress)
+    typer.echo(text)
+    typer.echo(out)
+
+
+@app.command()
+def paper(out: Out = None) -> None:
+    """The source paper again: its 12 panels with both models, and a verdict on each of its claims."""
+    from toolkit.output import whole_folder
+    from toolkit.paper import reproduce_paper
+
+    out = out or Path("paper")
+    with _progress() as progress, whole_folder(out) as folder:
+        text = reproduce_paper(folder, progress=progress)
+    typer.echo(text)
+    typer.echo(out)
+
+
+@app.command()
+def batch(
+    recordings: Annotated[Path, typer.Argument(metavar="FOLDER")],
+    out: Out = None,
+    scene: SceneFile = None,
+    mass_kg: Mass = None,
+    length_m: Length = None,
+    bob_radius_m: BobRadius = None,
+    g: Gravity = None,
+    lang: Lang = "en",
+    format: Formats = "html,pdf",
+    jobs: Annotated[int, typer.Option("--jobs", help="Recordings at once (default: one a processor).")] = 0,
+) -> None:
+    """A class at once: one report a recording, summary.csv and index.html."""
+    from toolkit.batch import analyse_folder
+
+    known = _scene(scene, mass_kg, length_m, bob_radius_m, g)
+    out = out or Path(f"{recordings.name}-reports")
+    formats = tuple(part.strip() for part in format.split(",") if part.strip())
+    with _progress() as progress:
+        rows = analyse_folder(
+            recordings, out, known, lang=lang, formats=formats, jobs=jobs, progress=progress
+        )
+    for row in rows:
+        typer.echo(f"{row.recording}: {row.sentence}")
+    typer.echo(out / "index.html")
+    if not any(row.done for row in rows):
+        raise typer.Exit(1)
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN")],
+    target: Annotated[Path, typer.Argument(metavar="OUT")],
+) -> None:
+    """Between the series formats; the endings say which."""
+    from toolkit.output import whole_file
+    from toolkit.series_io import read_series, write_series
+
+    series = read_series(source)
+    with whole_file(target) as unfinished:
+        write_series(series, unfinished)
+    _print_warnings(series.meta.get("warnings", ()))
+    typer.echo(target)
+
+
+@app.command()
+def effects() -> None:
+    """What can act on a pendulum: formulas, units, ranges, references."""
+    from toolkit.effects import describe
+
+    typer.echo(describe())
+
+
+@app.command()
+def models() -> None:
+    """What can be fitted: formulas and parameters with units."""
+    from toolkit.models import describe
+
+    typer.echo(describe())
+
+
+@app.command()
+def trackers() -> None:
+    """What can localise a bob."""
+    from toolkit.trackers import describe
+
+    typer.echo(describe())
+
+
+def main() -> None:
+    """Run the command; every failure is one line on stderr and an exit code."""
+    for stream in (sys.stdout, sys.stderr):  # Thai and θ also where the console's own encoding cannot
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(encoding="utf-8", errors="replace")
+    try:
+        code = app(standalone_mode=False)
+    except (typer.Abort, KeyboardInterrupt):
+        _fail("stopped; nothing unfinished was left behind", 130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    except Exception as error:
+        from toolkit.errors import PendulabError
+
+        if isinstance(error, PendulabError):
+            _fail(str(error), error.exit_code)
+        if hasattr(error, "format_message"):  # the command-line parser's own errors
+            _fail(error.format_message(), 2, " (--help says more)")
+        if os.environ.get("PENDULAB_DEBUG"):
+            raise
+        kind = "out of memory" if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"
+        _fail(f"unexpected trouble ({kind}); set PENDULAB_DEBUG=1 to see where, and tell the developers", 1)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _fail(sentence: str, code: int, tail: str = "") -> None:
+    print(f"pendulab: {' '.join(sentence.split())}{tail}", file=sys.stderr)
+    sys.exit(code)
+
+
+def _report(
+    recording: Path,
+    scene: Scene,
+    out: Path,
+    *,
+    formats: tuple[str, ...],
+    lang: str,
+    overlay: bool,
+    models: list[str] | None = None,
+    **measuring: Any,
+) -> None:
+    from toolkit.analyse import analyse, write_analysis
+    from toolkit.output import whole_folder
+    from toolkit.report import build_report, check_choice, write_report
+
+    check_choice(formats, lang)
+    with _progress() as progress, whole_folder(out) as folder:
+        analysis = analyse(recording, scene, models=models, progress=progress, **measuring)
+        write_analysis(analysis, folder)
+        progress("writing the report", 0.0)
+        written = write_report(build_report(analysis, lang=lang), folder, formats)
+        if overlay and analysis.track is not None and analysis.video is not None:
+            from toolkit.overlay import write_overlay
+
+            write_overlay(
+                analysis.video,
+                analysis.track,
+                folder / "overlay.mp4",
+                analysis.best.theta_rad,
+                progress=progress,
+            )
+    _print_analysis(analysis)
+    for path in written:
+        typer.echo(out / path.name)
+
+
+def _scene(
+    path: Path | None,
+    mass_kg: float | None,
+    length_m: float | None,
+    bob_radius_m: float | None,
+    g: float | None,
+) -> Scene:
+    """The scene file's content, or an empty scene, with what the options say put over it."""
+    from dataclasses import replace
+
+    from toolkit.scene import Scene
+
+    scene = Scene.from_toml(path) if path is not None else Scene()
+    given = {"mass_kg": mass_kg, "length_m": length_m, "bob_radius_m": bob_radius_m}
+    pendulum = replace(scene.pendulum, **{name: value for name, value in given.items() if value is not None})
+    environment = (
+        scene.environment if g is None else replace(scene.environment, g_m_per_s2=g, latitude_deg=None)
+    )
+    return replace(scene, pendulum=pendulum, environment=environment)
+
+
+def _measuring(
+    recording: Path,
+    start: float | None,
+    stop: float | None,
+    pivot: str | None,
+    bob: str | None,
+    radius: float | None,
+    fps_factor: float,
+) -> dict[str, Any]:
+    from toolkit.analyse import is_video
+    from toolkit.errors import UsageError
+
+    tracking = _tracking(pivot, bob, radius, fps_factor)
+    if is_video(recording):
+        return {"start_s": start, "stop_s": stop, **tracking}
+    if pivot or bob or radius is not None or fps_factor != 1.0:
+        raise UsageError(
+            f"--pivot, --bob, --radius and --fps-factor are for videos; {recording.name} is a θ(t) file"
+        )
+    return {"start_s": start, "stop_s": stop}
+
+
+def _tracking(pivot: str | None, bob: str | None, radius: float | None, fps_factor: float) -> dict[str, Any]:
+    from toolkit.errors import UsageError
+
+    if not fps_factor > 0:
+        raise UsageError(f"--fps-factor must be positive, got {fps_factor}")
+    if radius is not None and not radius > 0:
+        raise UsageError(f"--radius must be positive, got {radius}")
+    return {
+        "pivot": _point(pivot, "--pivot"),
+        "bob": _point(bob, "--bob"),
+        "radius": radius,
+        "fps_factor": fps_factor,
+    }
+
+
+def _point(text: str | None, option: str) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    from math import isfinite
+
+    from toolkit.errors import UsageError
+
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        x = y = float("nan")
+    if not (isfinite(x) and isfinite(y)):
+        raise UsageError(f"{option} needs two numbers X,Y in pixels (like 320,40), got {text!r}")
+    return x, y
+
+
+def _print_analysis(analysis: Analysis) -> None:
+    from toolkit.report.terminal import summary_lines
+
+    for line in summary_lines(analysis):
+        typer.echo(line)
+    _print_warnings(analysis.series.meta.get("warnings", ()))
+
+
+def _print_warnings(sentences: Any) -> None:
+    for sentence in sentences:
+        typer.echo(f"note: {sentence}")
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """A progress bar on stderr where that is a terminal; silence elsewhere."""
+    from toolkit.progress import silent
+
+    if not sys.stderr.isatty():
+        yield silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=1.0)
+
+        def show(stage: str, fraction: float) -> None:
+            bar.update(task, description=stage, completed=fraction)
+
+        yield show
+
+
+if __name__ == "__main__":
+    main()

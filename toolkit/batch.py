@@ -1,0 +1,155 @@
+"""A class at once: one report a recording, one table, one page that links them."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from toolkit.analyse import SERIES_SUFFIXES, VIDEO_SUFFIXES
+from toolkit.errors import JobError, PendulabError, UsageError
+from toolkit.progress import Progress, silent
+from toolkit.scene import Scene
+
+
+@dataclass(frozen=True)
+class BatchRow:
+    """One recording of a class: whether it was done, a sentence, and the numbers for the table."""
+
+    recording: str
+    done: bool
+    sentence: str
+    numbers: dict[str, Any] = field(default_factory=dict)
+    page: str = ""
+
+
+def analyse_folder(
+    folder: str | Path,
+    out: str | Path,
+    scene: Scene | None = None,
+    *,
+    lang: str = "en",
+    formats: tuple[str, ...] = ("html", "pdf"),
+    jobs: int = 0,
+    progress: Progress = silent,
+) -> list[BatchRow]:
+    """Analyse every recording in `folder`; write OUT/NAME/report.…, OUT/summary.csv and OUT/index.html.
+
+    A recording NAME.mp4 with a NAME.toml beside it uses that scene. A recording that fails becomes a row with
+    its one-line reason; the others go on. jobs : processes at once; 0 is one a processor.
+    Raises JobError where there is no recording in the folder.
+    """
+    from joblib import Parallel, cpu_count, delayed
+
+    from toolkit.report import check_choice
+
+    folder, out = Path(folder), Path(out)
+    check_choice(formats, lang)
+    if not folder.is_dir():
+        raise JobError(f"{folder} is not a folder; give the folder that holds the recordings")
+    if jobs < 0:
+        raise UsageError(f"--jobs must be 0 (one a processor) or more, got {jobs}")
+    recordings = sorted(p for p in folder.iterdir() if p.suffix.lower() in VIDEO_SUFFIXES | SERIES_SUFFIXES)
+    recordings = [p for p in recordings if not p.name.endswith(".truth.csv")]
+    if not recordings:
+        raise JobError(
+            f"{folder} holds no video and no θ(t) file; known endings are .mp4 .mov .avi … .csv .txt .trk"
+        )
+    tasks = (
+        delayed(_analyse_one)(path, out / name, scene or Scene(), lang, formats)
+        for path, name in zip(recordings, _distinct_names(recordings))
+    )
+    rows: list[BatchRow] = []
+    workers = jobs or cpu_count()
+    results: Iterator[BatchRow] = Parallel(n_jobs=min(workers, len(recordings)), return_as="generator")(tasks)
+    for row in results:
+        rows.append(row)
+        progress(f"{len(rows)} of {len(recordings)} recordings", len(rows) / len(recordings))
+    _write_summary(rows, out)
+    return rows
+
+
+def _distinct_names(recordings: list[Path]) -> list[str]:
+    """A folder name for each recording: its stem, or its whole name where two share a stem."""
+    stems = [path.stem for path in recordings]
+    return [path.stem if stems.count(path.stem) == 1 else path.name for path in recordings]
+
+
+def _analyse_one(path: Path, out: Path, scene: Scene, lang: str, formats: tuple[str, ...]) -> BatchRow:
+    from toolkit.analyse import analyse, write_analysis
+    from toolkit.output import whole_folder
+    from toolkit.report import build_report, write_report
+
+    try:
+        own_scene = path.with_suffix(".toml")
+        if own_scene.is_file():
+            scene = Scene.from_toml(own_scene)
+        with whole_folder(out) as unfinished:
+            analysis = analyse(path, scene)
+            write_analysis(analysis, unfinished)
+            written = write_report(build_report(analysis, lang=lang), unfinished, formats)
+    except PendulabError as error:
+        return BatchRow(path.name, False, " ".join(str(error).split()))
+    except Exception as error:  # one bad recording must not end a class
+        return BatchRow(path.name, False, f"unexpected trouble ({type(error).__name__}: {error})")
+    verdicts = {finding.assumption: finding.verdict for finding in analysis.findings}
+    numbers: dict[str, Any] = {
+        "points": len(analysis.series),
+        "duration_s": analysis.series.duration_s,
+        "preferred_model": analysis.preferred,
+        "small_angle": verdicts.get("small_angle", ""),
+        "linear_drag": verdicts.get("linear_drag", ""),
+        "reduced_chi2": analysis.best.reduced_chi2,
+    }
+    for name, parameter in {**analysis.best.parameters, **analysis.best.derived}.items():
+        key = name if parameter.unit in ("", "1") else f"{name} [{parameter.unit}]"
+        numbers[key] = parameter.value
+        numbers[f"u({key})"] = parameter.stderr
+    sentence = (
+        f"{analysis.preferred}; small angle {numbers['small_angle']}, linear drag {numbers['linear_drag']}"
+    )
+    page = next((f"{out.name}/{p.name}" for p in written if p.suffix == ".html"), "")
+    return BatchRow(path.name, True, sentence, numbers, page)
+
+
+def _write_summary(rows: list[BatchRow], out: Path) -> None:
+    import pandas as pd
+
+    from toolkit.output import whole_folder
+
+    table = pd.DataFrame(
+        [{"recording": r.recording, "done": r.done, "message": r.sentence, **r.numbers} for r in rows]
+    )
+    with whole_folder(out) as unfinished:
+        table.to_csv(unfinished / "summary.csv", index=False)
+        (unfinished / "index.html").write_text(_index_page(rows), encoding="utf-8")
+
+
+def _index_page(rows: list[BatchRow]) -> str:
+    lines = []
+    for row in rows:
+        name = html.escape(row.recording)
+        link = f'<a href="{html.escape(row.page, quote=True)}">{name}</a>' if row.page else name
+        state = "done" if row.done else "failed"
+        lines.append(
+            f'<tr class="{state}"><td>{link}</td><td>{state}</td><td>{html.escape(row.sentence)}</td></tr>'
+        )
+    done = sum(row.done for row in rows)
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>pendulab: {done} of {len(rows)} recordings</title>
+<style>
+:root {{ color-scheme: light dark }}
+body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }}
+table {{ border-collapse: collapse; width: 100% }}
+td, th {{ text-align: left; padding: .4rem .8rem; border-bottom: 1px solid #8886 }}
+.failed td {{ color: #b3261e }}
+</style></head><body>
+<h1>{done} of {len(rows)} recordings analysed</h1>
+<p>All numbers are in <a href="summary.csv">summary.csv</a>.</p>
+<table><tr><th>recording</th><th></th><th>result</th></tr>
+{chr(10).join(lines)}
+</table></body></html>
+"""
