@@ -31,21 +31,13 @@ SceneFile = Annotated[Path | None, typer.Option("--scene", help="Scene file (TOM
 Mass = Annotated[float | None, typer.Option("--mass-kg", help="Mass of the bob in kg.")]
 Length = Annotated[float | None, typer.Option("--length-m", help="Length from pivot to bob centre in m.")]
 BobRadius = Annotated[float | None, typer.Option("--bob-radius-m", help="Radius of the bob in m.")]
-Gravity = Annotated[
-    float | None, typer.Option("--g", help="Gravitational acceleration in m/s² (default 9.80665).")
-]
+Gravity = Annotated[float | None, typer.Option("--g", help="Gravitational acceleration in m/s² (default 9.80665).")]
 FpsFactor = Annotated[
     float,
-    typer.Option(
-        "--fps-factor", help="Slow motion: how many times slower the clip plays (8 for 240 shown at 30)."
-    ),
+    typer.Option("--fps-factor", help="Slow motion: how many times slower the clip plays (8 for 240 shown at 30)."),
 ]
-PivotXY = Annotated[
-    str | None, typer.Option("--pivot", metavar="X,Y", help="Pivot in pixels, instead of finding it.")
-]
-BobXY = Annotated[
-    str | None, typer.Option("--bob", metavar="X,Y", help="Bob in the first frame used, in pixels.")
-]
+PivotXY = Annotated[str | None, typer.Option("--pivot", metavar="X,Y", help="Pivot in pixels, instead of finding it.")]
+BobXY = Annotated[str | None, typer.Option("--bob", metavar="X,Y", help="Bob in the first frame used, in pixels.")]
 RadiusPx = Annotated[float | None, typer.Option("--radius", help="Radius of the bob in pixels.")]
 Start = Annotated[float | None, typer.Option("--start", help="Use the recording from this time on, in s.")]
 Stop = Annotated[float | None, typer.Option("--stop", help="Use the recording up to this time, in s.")]
@@ -60,9 +52,7 @@ Quick = Annotated[bool, typer.Option("--quick", help="Fewer cases, in under a mi
 
 @app.callback()
 def about(
-    version: Annotated[
-        bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)
-    ] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)] = False,
 ) -> None:
     """From a phone video of a pendulum to θ(t) with error bars, fitted models, and a report."""
     if version:
@@ -103,9 +93,7 @@ def track(
     radius: RadiusPx = None,
     start: Start = None,
     stop: Stop = None,
-    localiser: Annotated[
-        str | None, typer.Option("--localiser", help="Use this localiser (see `trackers`).")
-    ] = None,
+    localiser: Annotated[str | None, typer.Option("--localiser", help="Use this localiser (see `trackers`).")] = None,
     overlay: Overlay = False,
 ) -> None:
     """Track the bob in VIDEO: track.csv, theta.csv, calibration.json."""
@@ -115,9 +103,7 @@ def track(
 
     known = _scene(scene, mass_kg, length_m, bob_radius_m, g)
     if not is_video(video):
-        raise UsageError(
-            f"{video.name} is a θ(t) file, not a video: use `pendulab fit` or `pendulab report` on it"
-        )
+        raise UsageError(f"{video.name} is a θ(t) file, not a video: use `pendulab fit` or `pendulab report` on it")
     out = out or Path(f"{video.stem}-track")
     with _progress() as progress, whole_folder(out) as folder:
         series, found = measure(
@@ -130,9 +116,7 @@ def track(
 
             write_overlay(video, found, folder / "overlay.mp4", progress=progress)
     if found is not None:
-        typer.echo(
-            f"{int(found.ok.sum())} of {len(found.frame)} frames measured by the {found.localiser} localiser"
-        )
+        typer.echo(f"{int(found.ok.sum())} of {len(found.frame)} frames measured by the {found.localiser} localiser")
     _print_warnings(series.meta.get("warnings", ()))
     typer.echo(out / "theta.csv")
 
@@ -205,24 +189,18 @@ def report(
 def simulate(
     scene: Path,
     out: Annotated[Path, typer.Option("--out", help="CSV file to write.")],
-    accuracy: Annotated[
-        float, typer.Option("--accuracy", help="Largest error of θ to allow, in rad.")
-    ] = 1e-9,
-    duration_s: Annotated[
-        float | None, typer.Option("--duration-s", help="Default: the camera's, else 10 s.")
-    ] = None,
-    rate_hz: Annotated[
-        float | None, typer.Option("--rate-hz", help="Default: the camera's fps, else 100 Hz.")
-    ] = None,
+    accuracy: Annotated[float, typer.Option("--accuracy", help="Largest error of θ to allow, in rad.")] = 1e-9,
+    duration_s: Annotated[float | None, typer.Option("--duration-s", help="Default: the camera's, else 10 s.")] = None,
+    rate_hz: Annotated[float | None, typer.Option("--rate-hz", help="Default: the camera's fps, else 100 Hz.")] = None,
 ) -> None:
     """Solve the equation of motion of SCENE: t, θ, θ̇, tension, energy as CSV."""
     import numpy as np
+    from toolkit.simulate import simulate as solve
+    from toolkit.simulate import write_trajectory_csv
 
     from toolkit.errors import UsageError
     from toolkit.output import whole_file
     from toolkit.scene import Scene
-    from toolkit.simulate import simulate as solve
-    from toolkit.simulate import write_trajectory_csv
 
     known = Scene.from_toml(scene)
     length = duration_s if duration_s is not None else (known.camera.duration_s if known.camera else 10.0)
@@ -230,12 +208,10 @@ def simulate(
     if not length >= 0 or not rate > 0:
         raise UsageError(f"--duration-s must be ≥ 0 and --rate-hz > 0, got {length} and {rate}")
     if length * rate > 2e7:
-        raise UsageError(
-            f"{length:g} s at {rate:g} Hz is more than 20 million rows; lower --rate-hz or --duration-s"
-        )
+        raise UsageError(f"{length:g} s at {rate:g} Hz is more than 20 million rows; lower --rate-hz or --duration-s")
     with _progress() as progress:
         progress("solving", 0.0)
-        trajectory = solve(known, np.arange(int(round(length * rate)) + 1) / rate, accuracy_rad=accuracy)
+        trajectory = solve(known, np.arange(round(length * rate) + 1) / rate, accuracy_rad=accuracy)
         with whole_file(out) as unfinished:
             write_trajectory_csv(trajectory, unfinished)
     cost = trajectory.cost
@@ -253,12 +229,11 @@ def simulate(
 @app.command()
 def render(
     scene: Path,
-    out: Annotated[
-        Path, typer.Option("--out", help="Video file to write; its truth goes to NAME.truth.csv.")
-    ],
+    out: Annotated[Path, typer.Option("--out", help="Video file to write; its truth goes to NAME.truth.csv.")],
 ) -> None:
     """Film SCENE: a synthetic video with its exact truth in a side-car."""
     from toolkit.render import render as film
+
     from toolkit.scene import Scene
 
     with _progress() as progress:
@@ -294,8 +269,9 @@ def cost(
 @app.command()
 def paper(out: Out = None) -> None:
     """The source paper again: its 12 panels with both models, and a verdict on each of its claims."""
-    from toolkit.output import whole_folder
     from toolkit.paper import reproduce_paper
+
+    from toolkit.output import whole_folder
 
     out = out or Path("paper")
     with _progress() as progress, whole_folder(out) as folder:
@@ -324,9 +300,7 @@ def batch(
     out = out or Path(f"{recordings.name}-reports")
     formats = tuple(part.strip() for part in format.split(",") if part.strip())
     with _progress() as progress:
-        rows = analyse_folder(
-            recordings, out, known, lang=lang, formats=formats, jobs=jobs, progress=progress
-        )
+        rows = analyse_folder(recordings, out, known, lang=lang, formats=formats, jobs=jobs, progress=progress)
     for row in rows:
         typer.echo(f"{row.recording}: {row.sentence}")
     typer.echo(out / "index.html")
@@ -456,9 +430,7 @@ def _scene(
     scene = Scene.from_toml(path) if path is not None else Scene()
     given = {"mass_kg": mass_kg, "length_m": length_m, "bob_radius_m": bob_radius_m}
     pendulum = replace(scene.pendulum, **{name: value for name, value in given.items() if value is not None})
-    environment = (
-        scene.environment if g is None else replace(scene.environment, g_m_per_s2=g, latitude_deg=None)
-    )
+    environment = scene.environment if g is None else replace(scene.environment, g_m_per_s2=g, latitude_deg=None)
     return replace(scene, pendulum=pendulum, environment=environment)
 
 
@@ -478,9 +450,7 @@ def _measuring(
     if is_video(recording):
         return {"start_s": start, "stop_s": stop, **tracking}
     if pivot or bob or radius is not None or fps_factor != 1.0:
-        raise UsageError(
-            f"--pivot, --bob, --radius and --fps-factor are for videos; {recording.name} is a θ(t) file"
-        )
+        raise UsageError(f"--pivot, --bob, --radius and --fps-factor are for videos; {recording.name} is a θ(t) file")
     return {"start_s": start, "stop_s": stop}
 
 

@@ -77,7 +77,8 @@ class ThetaSeries:
             keep &= self.t_s <= stop_s
         if not keep.any():
             raise UsageError(
-                f"no data between {start_s} s and {stop_s} s; the record runs from {self.t_s[0]:.3g} s to {self.t_s[-1]:.3g} s"
+                f"no data between {start_s} s and {stop_s} s; "
+                f"the record runs from {self.t_s[0]:.3g} s to {self.t_s[-1]:.3g} s"
             )
         sigma = None if self.sigma_theta_rad is None else self.sigma_theta_rad[keep]
         kept = self.t_s[keep]
