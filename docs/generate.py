@@ -1,0 +1,77 @@
+"""Write the pages of the reference that the code itself can tell: commands, effects, models, localisers.
+
+    python docs/generate.py            write docs/reference/*.md
+    python docs/generate.py --check    say which pages are out of date; exit 1 if any
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+REFERENCE = Path(__file__).resolve().parent / "reference"
+sys.path.insert(0, str(REFERENCE.parents[1]))
+
+
+def commands_page() -> str:
+    """Every command with its arguments and options, from the command line's own definition."""
+    import typer.main
+
+    import cli
+
+    group = typer.main.get_command(cli.app)
+    lines = ["# Commands", "", "`pendulab CMD` and `python cli.py CMD` are the same.", ""]
+    for name, command in sorted(group.commands.items()):  # type: ignore[attr-defined]
+        lines += [f"## pendulab {name}", "", (command.help or "").strip(), ""]
+        rows = []
+        for parameter in command.params:
+            if parameter.param_type_name == "argument":
+                label = parameter.metavar or parameter.name.upper()
+                text = getattr(parameter, "help", None) or ("required" if parameter.required else "")
+            else:
+                label = ", ".join(parameter.opts)
+                text = parameter.help or ""
+                if parameter.default not in (None, False, []) and not callable(parameter.default):
+                    text += f" Default: {parameter.default}."
+            rows.append(f"| `{label}` | {text.replace('|', chr(92) + '|')} |")
+        if rows:
+            lines += ["| | |", "|---|---|", *rows, ""]
+    return "\n".join(lines)
+
+
+def listing_page(title: str, text: str) -> str:
+    """A page that shows what one of the listing commands prints."""
+    return f"# {title}\n\n```text\n{text.rstrip()}\n```\n"
+
+
+def pages() -> dict[str, str]:
+    """File name -> content of every generated page."""
+    from toolkit import effects, models, trackers
+
+    return {
+        "commands.md": commands_page(),
+        "effects.md": listing_page("What can act on a pendulum", effects.describe()),
+        "models.md": listing_page("What can be fitted", models.describe()),
+        "trackers.md": listing_page("What can localise a bob", trackers.describe()),
+    }
+
+
+def main() -> int:
+    """Write or check the pages."""
+    stale = []
+    for name, content in pages().items():
+        path = REFERENCE / name
+        if path.is_file() and path.read_text(encoding="utf-8") == content:
+            continue
+        stale.append(name)
+        if "--check" not in sys.argv:
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(content, encoding="utf-8")
+    if "--check" in sys.argv and stale:
+        print(f"out of date: {', '.join(stale)}; run python docs/generate.py")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
