@@ -1,0 +1,422 @@
+"""The linear pendulum, solved exactly in every regime:  θ̈ + 2α θ̇ + ω_g² θ = a cos(ω_f t + ψ) + b.
+
+With D(s) = s² + 2αs + ω_g², everything is one of five functions, named by their Laplace transforms:
+
+    S = 1/D     S2 = 1/D²     P = 1/(D (s−iω_f))     Q = 1/(D² (s−iω_f))     R = 1/(D (s−iω_f)²)
+
+    θ = θ(0) (Ṡ + 2αS) + θ̇(0) S + a Re(e^{iψ} P) + b P(ω_f = 0)
+
+and S2, Q, R are their derivatives by the parameters. These functions are divided differences of e^{λt} at the roots
+λ₁, λ₂ of D and at iω_f, so they stay smooth where roots meet (critical damping) or meet iω_f (resonance); each is
+evaluated by the one of its forms that does not cancel there. Nothing is multiplied by e^{+αt}: no overflow at any t.
+Phases are carried in doubled precision, so that long times cost no digits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.errors import UsageError
+from toolkit.motion.exact_arithmetic import cos_and_sin_of_product, root_of_difference_of_squares
+
+PARAMETERS = (
+    "theta0_rad",
+    "omega0_rad_per_s",
+    "alpha_per_s",
+    "omega_g_rad_per_s",
+    "drive_rad_per_s2",
+    "omega_f_rad_per_s",
+    "phase_rad",
+    "constant_rad_per_s2",
+)
+PAPER_PARAMETERS = (
+    "theta0_rad",
+    "phi_rad",
+    "alpha_d_per_s",
+    "omega_g_rad_per_s",
+    "drive_rad_per_s2",
+    "omega_f_rad_per_s",
+    "phase_rad",
+)
+_TAYLOR_TERMS = 30
+
+
+@dataclass(frozen=True)
+class LinearSolution:
+    """θ and θ̇, (n,) each, and their derivatives (n, k) by the k parameters named in `derivatives`."""
+
+    theta_rad: np.ndarray
+    omega_rad_per_s: np.ndarray
+    d_theta: np.ndarray
+    d_omega: np.ndarray
+    derivatives: tuple[str, ...] = ()
+
+
+def solve_linear(
+    t_s: np.ndarray,
+    theta0_rad: float,
+    omega0_rad_per_s: float,
+    alpha_per_s: float,
+    omega_g_rad_per_s: float,
+    drive_rad_per_s2: float = 0.0,
+    omega_f_rad_per_s: float = 0.0,
+    phase_rad: float = 0.0,
+    constant_rad_per_s2: float = 0.0,
+    derivatives: Sequence[str] = (),
+) -> LinearSolution:
+    """Solve θ̈ + 2α θ̇ + ω_g² θ = drive·cos(ω_f t + phase) + constant from θ(0), θ̇(0).
+
+    t_s : (n,) times ≥ 0 in s. alpha_per_s: α = k_d/(2m), any sign; omega_g_rad_per_s ≥ 0. Under-, critically and
+    overdamped motion, resonance with and without damping, and ω_f = 0 are all included.
+    derivatives : names out of `PARAMETERS` (the argument names); d_theta and d_omega hold one column each.
+    Raises UsageError for an unknown derivative, a negative time, ω_g < 0 or a number that is not finite.
+    """
+    values = (theta0_rad, omega0_rad_per_s, alpha_per_s, omega_g_rad_per_s, drive_rad_per_s2, omega_f_rad_per_s)
+    t = _checked_times(t_s, (*values, phase_rad, constant_rad_per_s2), omega_g_rad_per_s)
+    _check_names(derivatives, PARAMETERS)
+    alpha, omega_g = float(alpha_per_s), float(omega_g_rad_per_s)
+    square = omega_g * omega_g
+    by_roots = "alpha_per_s" in derivatives or "omega_g_rad_per_s" in derivatives
+    free = _solve_free(t, alpha, omega_g, by_roots)
+    held = free.velocity + 2 * alpha * free.value if free.held is None else free.held
+    theta = theta0_rad * held + omega0_rad_per_s * free.value
+    omega = omega0_rad_per_s * free.velocity - theta0_rad * square * free.value
+    by_alpha = by_square = by_alpha_dot = by_square_dot = np.zeros_like(t)
+    if by_roots:
+        s2, s2_dot = free.square, free.square_dot
+        s2_dot2 = free.value - 2 * alpha * s2_dot - square * s2
+        by_alpha = 2 * square * theta0_rad * s2 - 2 * omega0_rad_per_s * s2_dot
+        by_alpha_dot = 2 * square * theta0_rad * s2_dot - 2 * omega0_rad_per_s * s2_dot2
+        by_square = -theta0_rad * (s2_dot + 2 * alpha * s2) - omega0_rad_per_s * s2
+        by_square_dot = theta0_rad * (square * s2 - free.value) - omega0_rad_per_s * s2_dot
+    columns = {
+        "theta0_rad": (held, -square * free.value),
+        "omega0_rad_per_s": (free.value, free.velocity),
+    }
+    forces = (
+        ("drive_rad_per_s2", drive_rad_per_s2, float(omega_f_rad_per_s), float(phase_rad)),
+        ("constant_rad_per_s2", constant_rad_per_s2, 0.0, 0.0),
+    )
+    for name, strength, frequency, phase in forces:
+        if strength == 0 and name not in derivatives:
+            continue
+        by_frequency = name == "drive_rad_per_s2" and "omega_f_rad_per_s" in derivatives
+        forced = _solve_forced(t, alpha, frequency, free, by_roots, by_frequency)
+        turn = complex(math.cos(phase), math.sin(phase))
+        p, p_dot = turn * forced.value, turn * forced.velocity
+        theta = theta + strength * p.real
+        omega = omega + strength * p_dot.real
+        columns[name] = (p.real, p_dot.real)
+        if name == "drive_rad_per_s2":
+            columns["phase_rad"] = (-strength * p.imag, -strength * p_dot.imag)
+        if by_roots:
+            q, q_dot, q_dot2 = turn * forced.square, turn * forced.square_dot, turn * forced.square_dot2
+            by_alpha = by_alpha - 2 * strength * q_dot.real
+            by_alpha_dot = by_alpha_dot - 2 * strength * q_dot2.real
+            by_square = by_square - strength * q.real
+            by_square_dot = by_square_dot - strength * q_dot.real
+        if by_frequency:
+            columns["omega_f_rad_per_s"] = (
+                -strength * (turn * forced.by_frequency).imag,
+                -strength * (turn * forced.by_frequency_dot).imag,
+            )
+    columns["alpha_per_s"] = (by_alpha, by_alpha_dot)
+    columns["omega_g_rad_per_s"] = (2 * omega_g * by_square, 2 * omega_g * by_square_dot)
+    d_theta, d_omega = np.zeros((t.size, len(derivatives))), np.zeros((t.size, len(derivatives)))
+    for i, name in enumerate(derivatives):
+        if name in columns:  # a drive of strength zero does not depend on its frequency and phase
+            d_theta[:, i], d_omega[:, i] = columns[name]
+    return LinearSolution(theta, omega, d_theta, d_omega, tuple(derivatives))
+
+
+def paper_model(
+    t_s: np.ndarray,
+    theta0_rad: float,
+    phi_rad: float,
+    alpha_d_per_s: float,
+    omega_g_rad_per_s: float,
+    drive_rad_per_s2: float = 0.0,
+    omega_f_rad_per_s: float = 0.0,
+    phase_rad: float = 0.0,
+    derivatives: Sequence[str] = (),
+) -> LinearSolution:
+    """The paper's solution (10) + (18): θ = θ₀ e^{−α_d t} sin(ω_u t + φ) + θ_i,  ω_u² = ω_g² − α_d².
+
+    θ_i is the driven part, θ_i(0) = θ̇_i(0) = 0, of a drive drive·cos(ω_f t + phase) with drive = f₀/(mℓ).
+
+    φ is carried through critical damping by its start: in every regime θ(0) = θ₀ sin φ and
+    θ̇(0) = θ₀ (|ω_u| cos φ − α_d sin φ). Beyond critical damping that is
+    θ₀ e^{−α_d t} (sin φ cosh|ω_u|t + cos φ sinh|ω_u|t): continuous in α_d and ω_g. Its slope is not, as |ω_u| has a
+    square root there; at ω_u = 0 itself that infinite slope of |ω_u| is left out of the derivatives.
+    derivatives : names out of `PAPER_PARAMETERS`. Raises UsageError as `solve_linear` does.
+    """
+    _check_names(derivatives, PAPER_PARAMETERS)
+    alpha, omega_g = float(alpha_d_per_s), float(omega_g_rad_per_s)
+    _require_finite((theta0_rad, phi_rad, alpha, omega_g))
+    rate, _, sign = root_of_difference_of_squares(omega_g, abs(alpha))
+    sin, cos = math.sin(phi_rad), math.cos(phi_rad)
+    inner = [_PAPER_TO_LINEAR.get(name, name) for name in derivatives if name not in ("theta0_rad", "phi_rad")]
+    if derivatives:
+        inner += ["theta0_rad", "omega0_rad_per_s"]
+    start, slope = theta0_rad * sin, theta0_rad * (rate * cos - alpha * sin)
+    drive = (drive_rad_per_s2, omega_f_rad_per_s, phase_rad)
+    solved = solve_linear(t_s, start, slope, alpha, omega_g, *drive, derivatives=inner)
+    if not derivatives:
+        return solved
+    by_start = np.stack([solved.d_theta[:, -2], solved.d_omega[:, -2]])
+    by_slope = np.stack([solved.d_theta[:, -1], solved.d_omega[:, -1]])
+    chain = {
+        "theta0_rad": sin * by_start + (rate * cos - alpha * sin) * by_slope,
+        "phi_rad": theta0_rad * (cos * by_start - (rate * sin + alpha * cos) * by_slope),
+        "alpha_d_per_s": -theta0_rad * ((sign * alpha / rate if rate else 0.0) * cos + sin) * by_slope,
+        "omega_g_rad_per_s": theta0_rad * (sign * omega_g / rate if rate else 0.0) * cos * by_slope,
+    }
+    pair = np.zeros((2, solved.theta_rad.size, len(derivatives)))
+    for i, name in enumerate(derivatives):
+        if name in chain:
+            pair[:, :, i] = chain[name]
+        if name not in ("theta0_rad", "phi_rad"):
+            column = inner.index(_PAPER_TO_LINEAR.get(name, name))
+            pair[:, :, i] += np.stack([solved.d_theta[:, column], solved.d_omega[:, column]])
+    return LinearSolution(solved.theta_rad, solved.omega_rad_per_s, pair[0], pair[1], tuple(derivatives))
+
+
+def steady_state(
+    alpha_per_s: float, omega_g_rad_per_s: float, drive_rad_per_s2: float, omega_f_rad_per_s: float
+) -> complex:
+    """Complex amplitude Z of the steady motion θ = Re(Z e^{iω_f t}) in rad; its modulus is the amplitude.
+
+    Raises UsageError where there is no steady state (undamped at resonance).
+    """
+    roots = _roots(float(alpha_per_s), float(omega_g_rad_per_s))
+    denominator = (roots.first - 1j * omega_f_rad_per_s + 1j * roots.lost) * (
+        roots.second - 1j * omega_f_rad_per_s - 1j * roots.lost
+    )
+    if denominator == 0:
+        raise UsageError("an undamped pendulum driven at its own frequency has no steady state; give it drag")
+    return drive_rad_per_s2 / denominator
+
+
+_PAPER_TO_LINEAR = {"alpha_d_per_s": "alpha_per_s"}
+
+
+@dataclass(frozen=True)
+class _Roots:
+    """λ₁, λ₂ of D, their half distance |ω_u| = rate + lost, and the sign of ω_g² − α²."""
+
+    first: complex
+    second: complex
+    rate: float
+    lost: float  # of the imaginary part of λ₁ (and with the other sign of λ₂) where sign > 0, else 0
+    rate_lost: float
+    sign: int
+
+
+def _roots(alpha: float, omega_g: float) -> _Roots:
+    rate, rate_lost, sign = root_of_difference_of_squares(omega_g, abs(alpha))
+    if sign >= 0:
+        return _Roots(complex(-alpha, rate), complex(-alpha, -rate), rate, rate_lost, rate_lost, sign)
+    far = -math.copysign(abs(alpha) + rate, alpha)
+    near = omega_g * omega_g / far  # not −α + rate, which cancels
+    return _Roots(complex(max(near, far)), complex(min(near, far)), rate, 0.0, rate_lost, sign)
+
+
+@dataclass(frozen=True)
+class _Free:
+    """S, Ṡ, (Ṡ + 2αS where it needs its own form), S2, Ṡ2 at the times, and the roots."""
+
+    roots: _Roots
+    value: np.ndarray
+    velocity: np.ndarray
+    held: np.ndarray | None
+    square: np.ndarray
+    square_dot: np.ndarray
+
+
+def _solve_free(t: np.ndarray, alpha: float, omega_g: float, with_square: bool) -> _Free:
+    roots = _roots(alpha, omega_g)
+    rate = roots.rate
+    none = np.empty(0)
+    if roots.sign >= 0:
+        decay = np.exp(-alpha * t)
+        c, s = cos_and_sin_of_product(rate, roots.rate_lost, t)
+        stretched = s / rate if rate else t
+        value = decay * stretched
+        velocity = decay * (c - alpha * stretched)
+        held = decay * (c + alpha * stretched)
+        if not with_square:
+            return _Free(roots, value, velocity, held, none, none)
+        square = _squared_near_critical(t, alpha, -rate * rate)
+        far = rate * t >= 1
+        square[far] = (decay * (stretched - t * c))[far] / (2 * rate * rate)
+        return _Free(roots, value, velocity, held, square, 0.5 * t * value - alpha * square)
+    slow, fast = roots.first.real, roots.second.real
+    decay, fast_decay = np.exp(slow * t), np.exp(fast * t)
+    spread = -np.expm1(-2 * rate * t)
+    value = decay * spread / (2 * rate)
+    velocity = fast_decay + slow * value
+    held = decay - slow * value
+    if not with_square:
+        return _Free(roots, value, velocity, held, none, none)
+    square = _squared_near_critical(t, alpha, rate * rate)
+    square_dot = 0.5 * t * value - alpha * square
+    far = rate * t >= 1
+    scale = 1 / (4 * rate * rate)
+    square[far] = scale * (t * (decay + fast_decay) - 2 * value)[far]
+    square_dot[far] = scale * ((1 + slow * t) * decay + (1 + fast * t) * fast_decay - 2 * velocity)[far]
+    return _Free(roots, value, velocity, held, square, square_dot)
+
+
+def _squared_near_critical(t: np.ndarray, alpha: float, discriminant: float) -> np.ndarray:
+    """S2 where |discriminant| t² < 1, by its series; 0 elsewhere."""
+    square = np.zeros_like(t)
+    near = abs(discriminant) * t * t < 1
+    x, total = discriminant * t[near] ** 2, np.zeros(int(near.sum()))
+    for k in range(9, -1, -1):
+        total = total * x + (k + 1) / math.factorial(2 * k + 3)
+    square[near] = np.exp(-alpha * t[near]) * t[near] ** 3 * total
+    return square
+
+
+@dataclass(frozen=True)
+class _Forced:
+    """P, Ṗ, Q, Q̇, Q̈, R, Ṙ at the times, complex."""
+
+    value: np.ndarray
+    velocity: np.ndarray
+    square: np.ndarray
+    square_dot: np.ndarray
+    square_dot2: np.ndarray
+    by_frequency: np.ndarray
+    by_frequency_dot: np.ndarray
+
+
+def _solve_forced(
+    t: np.ndarray, alpha: float, frequency: float, free: _Free, with_square: bool, with_frequency: bool
+) -> _Forced:
+    roots = free.roots
+    shift = 1j * frequency
+    # λ − iω_f, with what rounding lost of λ put back after the subtraction that may cancel
+    first = roots.first - shift + 1j * roots.lost
+    second = roots.second - shift - 1j * roots.lost
+    near, far = sorted((first, second), key=abs)
+    c, s = cos_and_sin_of_product(frequency, 0.0, t)
+    wave = c + 1j * s
+    p, q, r = (np.zeros(t.size, dtype=complex) for _ in range(3))
+    all_close = abs(far) * t < 2
+    settled = ~all_close & (abs(near) * t >= 1)
+    resonant = ~all_close & ~settled
+    if settled.any():
+        m = slice(None) if settled.all() else settled
+        z = 1 / (near * far)
+        lead = shift + 2 * alpha
+        p[m] = z * (wave[m] - free.velocity[m] - lead * free.value[m])
+        if with_square:
+            q[m] = z * (p[m] - free.square_dot[m] - lead * free.square[m])
+        if with_frequency:
+            r[m] = z * (t[m] * wave[m] - (shift + lead) * p[m] - free.value[m])
+    if resonant.any():
+        m = resonant
+        _set_resonant(t[m], wave[m], near, far, m, p, q, r)
+    if all_close.any():
+        m = all_close
+        _set_close(t[m], wave[m], near, far, m, p, q, r)
+    p_dot = shift * p + free.value
+    if not with_square:
+        q_dot = q_dot2 = q
+    else:
+        q_dot = shift * q + free.square
+        q_dot2 = shift * q_dot + free.square_dot
+    return _Forced(p, p_dot, q, q_dot, q_dot2, r, shift * r + p)
+
+
+def _set_resonant(
+    t: np.ndarray,
+    wave: np.ndarray,
+    near: complex,
+    far: complex,
+    m: np.ndarray,
+    p: np.ndarray,
+    q: np.ndarray,
+    r: np.ndarray,
+) -> None:
+    """Partial fractions over the two roots, one of which is within 1/t of iω_f."""
+    z = near * t
+    e_near = wave * t * _phi1(z)
+    e_far = wave * np.expm1(far * t) / far
+    g_near = wave * t * t * _phi2(z)
+    g_far = (e_far - t * wave) / far
+    f_near = wave * np.exp(z) * t * t * _phi2(-z)
+    f_far = (t * wave * np.exp(far * t) - e_far) / far
+    gap = near - far
+    p[m] = (e_near - e_far) / gap
+    q[m] = (f_near + f_far - 2 * p[m]) / gap**2
+    r[m] = (g_near - g_far) / gap
+
+
+def _set_close(
+    t: np.ndarray,
+    wave: np.ndarray,
+    near: complex,
+    far: complex,
+    m: np.ndarray,
+    p: np.ndarray,
+    q: np.ndarray,
+    r: np.ndarray,
+) -> None:
+    """Taylor series about iω_f with both roots within 2/t of it: Σ h_k t^{k+n}/(k+n)!, h_k complete symmetric."""
+    unit = abs(far) or 1.0
+    once, twice = _complete_symmetric((near / unit, far / unit)), _complete_symmetric((near / unit, far / unit) * 2)
+    tau = t * unit
+    for target, coefficients, order in ((p, once, 2), (r, once, 3), (q, twice, 4)):
+        total = np.zeros(t.size, dtype=complex)
+        for k in range(_TAYLOR_TERMS - 1, -1, -1):
+            total = total * tau + coefficients[k] / math.factorial(k + order)
+        target[m] = wave * t**order * total
+
+
+def _complete_symmetric(nodes: tuple[complex, ...]) -> list[complex]:
+    h = [1.0 + 0j] + [0j] * (_TAYLOR_TERMS - 1)
+    for node in nodes:
+        for k in range(1, _TAYLOR_TERMS):
+            h[k] += node * h[k - 1]
+    return h
+
+
+def _phi1(z: np.ndarray) -> np.ndarray:
+    """(e^z − 1)/z."""
+    return np.where(z == 0, 1.0, np.expm1(z) / np.where(z == 0, 1.0, z))
+
+
+def _phi2(z: np.ndarray) -> np.ndarray:
+    """(e^z − 1 − z)/z² for |z| ≤ 1, by its series."""
+    total = np.zeros(z.shape, dtype=complex)
+    for k in range(18, -1, -1):
+        total = total * z + 1 / math.factorial(k + 2)
+    return total
+
+
+def _checked_times(t_s: np.ndarray, values: tuple[float, ...], omega_g: float) -> np.ndarray:
+    _require_finite(values)
+    if omega_g < 0:
+        raise UsageError(f"omega_g_rad_per_s must not be negative, got {omega_g}")
+    t = np.asarray(t_s, dtype=float)
+    if t.ndim != 1 or not np.all(np.isfinite(t)) or (t.size and t.min() < 0):
+        raise UsageError("t_s must be one column of finite times that are not negative; shift the time axis")
+    return t
+
+
+def _require_finite(values: tuple[float, ...]) -> None:
+    for value in values:
+        if not math.isfinite(value):
+            raise UsageError(f"the linear equation needs finite numbers, got {value}")
+
+
+def _check_names(names: Sequence[str], known: tuple[str, ...]) -> None:
+    for name in names:
+        if name not in known:
+            raise UsageError(f"no derivative by {name!r}; known are {', '.join(known)}")
