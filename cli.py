@@ -379,40 +379,14 @@ def _fail(sentence: str, code: int, tail: str = "") -> None:
     sys.exit(code)
 
 
-def _report(
-    recording: Path,
-    scene: Scene,
-    out: Path,
-    *,
-    formats: tuple[str, ...],
-    lang: str,
-    overlay: bool,
-    models: list[str] | None = None,
-    **measuring: Any,
-) -> None:
-    from toolkit.analyse import analyse, write_analysis
-    from toolkit.output import whole_folder
-    from toolkit.report import build_report, check_choice, write_report
+def _report(recording: Path, scene: Scene, out: Path, **choices: Any) -> None:
+    from toolkit.make_report import make_report
 
-    check_choice(formats, lang)
-    with _progress() as progress, whole_folder(out) as folder:
-        analysis = analyse(recording, scene, models=models, progress=progress, **measuring)
-        write_analysis(analysis, folder)
-        progress("writing the report", 0.0)
-        written = write_report(build_report(analysis, lang=lang), folder, formats)
-        if overlay and analysis.track is not None and analysis.video is not None:
-            from toolkit.overlay import write_overlay
-
-            write_overlay(
-                analysis.video,
-                analysis.track,
-                folder / "overlay.mp4",
-                analysis.best.theta_rad,
-                progress=progress,
-            )
+    with _progress() as progress:
+        analysis, written = make_report(recording, out, scene, progress=progress, **choices)
     _print_analysis(analysis)
     for path in written:
-        typer.echo(out / path.name)
+        typer.echo(path)
 
 
 def _scene(

@@ -13,6 +13,7 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOME = {
+    "Analysis": "analyse",
     "Camera": "scene",
     "Environment": "scene",
     "FitResult": "fit",
@@ -27,20 +28,23 @@ _HOME = {
     "Track": "track",
     "Trajectory": "trajectory",
     "UsageError": "errors",
+    "analyse": "analyse",
+    "build_report": "report",
     "calibrate": "calibrate",
     "diagnose": "diagnose",
     "fit": "fit",
     "fit_models": "fit",
+    "make_report": "make_report",
     "open_video": "video",
     "read_series": "series_io",
     "render": "render",
-    "report": "report",
     "simulate": "simulate",
     "track": "track",
+    "write_report": "report",
     "write_series": "series_io",
 }
 
-__all__ = sorted(_HOME)  # noqa: PLE0605
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:

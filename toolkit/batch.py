@@ -54,9 +54,7 @@ def analyse_folder(
     recordings = sorted(p for p in folder.iterdir() if p.suffix.lower() in VIDEO_SUFFIXES | SERIES_SUFFIXES)
     recordings = [p for p in recordings if not p.name.endswith(".truth.csv")]
     if not recordings:
-        raise JobError(
-            f"{folder} holds no video and no θ(t) file; known endings are .mp4 .mov .avi … .csv .txt .trk"
-        )
+        raise JobError(f"{folder} holds no video and no θ(t) file; known endings are .mp4 .mov .avi … .csv .txt .trk")
     tasks = (
         delayed(_analyse_one)(path, out / name, scene or Scene(), lang, formats)
         for path, name in zip(recordings, _distinct_names(recordings))
@@ -78,18 +76,13 @@ def _distinct_names(recordings: list[Path]) -> list[str]:
 
 
 def _analyse_one(path: Path, out: Path, scene: Scene, lang: str, formats: tuple[str, ...]) -> BatchRow:
-    from toolkit.analyse import analyse, write_analysis
-    from toolkit.output import whole_folder
-    from toolkit.report import build_report, write_report
+    from toolkit.make_report import make_report
 
     try:
         own_scene = path.with_suffix(".toml")
         if own_scene.is_file():
             scene = Scene.from_toml(own_scene)
-        with whole_folder(out) as unfinished:
-            analysis = analyse(path, scene)
-            write_analysis(analysis, unfinished)
-            written = write_report(build_report(analysis, lang=lang), unfinished, formats)
+        analysis, written = make_report(path, out, scene, formats=formats, lang=lang)
     except PendulabError as error:
         return BatchRow(path.name, False, " ".join(str(error).split()))
     except Exception as error:  # one bad recording must not end a class
@@ -107,9 +100,7 @@ def _analyse_one(path: Path, out: Path, scene: Scene, lang: str, formats: tuple[
         key = name if parameter.unit in ("", "1") else f"{name} [{parameter.unit}]"
         numbers[key] = parameter.value
         numbers[f"u({key})"] = parameter.stderr
-    sentence = (
-        f"{analysis.preferred}; small angle {numbers['small_angle']}, linear drag {numbers['linear_drag']}"
-    )
+    sentence = f"{analysis.preferred}; small angle {numbers['small_angle']}, linear drag {numbers['linear_drag']}"
     page = next((f"{out.name}/{p.name}" for p in written if p.suffix == ".html"), "")
     return BatchRow(path.name, True, sentence, numbers, page)
 
@@ -119,9 +110,7 @@ def _write_summary(rows: list[BatchRow], out: Path) -> None:
 
     from toolkit.output import whole_folder
 
-    table = pd.DataFrame(
-        [{"recording": r.recording, "done": r.done, "message": r.sentence, **r.numbers} for r in rows]
-    )
+    table = pd.DataFrame([{"recording": r.recording, "done": r.done, "message": r.sentence, **r.numbers} for r in rows])
     with whole_folder(out) as unfinished:
         table.to_csv(unfinished / "summary.csv", index=False)
         (unfinished / "index.html").write_text(_index_page(rows), encoding="utf-8")
@@ -133,9 +122,7 @@ def _index_page(rows: list[BatchRow]) -> str:
         name = html.escape(row.recording)
         link = f'<a href="{html.escape(row.page, quote=True)}">{name}</a>' if row.page else name
         state = "done" if row.done else "failed"
-        lines.append(
-            f'<tr class="{state}"><td>{link}</td><td>{state}</td><td>{html.escape(row.sentence)}</td></tr>'
-        )
+        lines.append(f'<tr class="{state}"><td>{link}</td><td>{state}</td><td>{html.escape(row.sentence)}</td></tr>')
     done = sum(row.done for row in rows)
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">

@@ -1,0 +1,46 @@
+"""One recording to one folder of results: what the command `report`, the demo, a class and the web page all call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from toolkit.analyse import Analysis, analyse, write_analysis
+from toolkit.output import whole_folder
+from toolkit.progress import Progress, silent
+from toolkit.scene import Scene
+
+
+def make_report(
+    recording: str | Path,
+    out: str | Path,
+    scene: Scene | None = None,
+    *,
+    formats: Sequence[str] = ("html", "pdf"),
+    lang: str = "en",
+    overlay: bool = False,
+    models: Sequence[str] | None = None,
+    progress: Progress = silent,
+    **measuring: Any,
+) -> tuple[Analysis, list[Path]]:
+    """Analyse `recording` and write all results and the report into the folder `out`, whole or not at all.
+
+    measuring : passed on to `measure` (`start_s`, `stop_s`, `pivot`, `bob` …).
+    Returns the analysis and the paths of the report's files. Raises UsageError for an unknown format or language
+    before anything is done, JobError where the recording cannot be used.
+    """
+    from toolkit.report import build_report, check_choice, write_report
+
+    check_choice(formats, lang)
+    out = Path(out)
+    with whole_folder(out) as folder:
+        analysis = analyse(recording, scene, models=models, progress=progress, **measuring)
+        write_analysis(analysis, folder)
+        progress("writing the report", 0.0)
+        written = write_report(build_report(analysis, lang=lang), folder, formats)
+        if overlay and analysis.track is not None and analysis.video is not None:
+            from toolkit.overlay import write_overlay
+
+            write_overlay(analysis.video, analysis.track, folder / "overlay.mp4", analysis.best.theta_rad, progress)
+    return analysis, [out / path.name for path in written]
