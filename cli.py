@@ -325,6 +325,15 @@ def convert(
 
 
 @app.command()
+def web(port: Annotated[int, typer.Option("--port", help="Port on this computer.")] = 8080) -> None:
+    """The same by clicking, in a browser on this computer."""
+    from toolkit.web import serve
+
+    typer.echo(f"http://127.0.0.1:{port} (Ctrl-C stops it)")
+    serve(port)
+
+
+@app.command()
 def effects() -> None:
     """What can act on a pendulum: formulas, units, ranges, references."""
     from toolkit.effects import describe

@@ -1,0 +1,210 @@
+"""The page: a recording in, optional clicks on its first frame, the report out. It calls what the command calls."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import shutil
+import tempfile
+import uuid
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from nicegui import app, events, run, ui
+
+from toolkit.analyse import SERIES_SUFFIXES, VIDEO_SUFFIXES, is_video
+from toolkit.errors import PendulabError
+from toolkit.make_report import make_report
+from toolkit.scene import Environment, Pendulum, Scene
+
+_WORDS = {
+    "en": {
+        "title": "From a video of a pendulum to a report",
+        "upload": "A video, or a θ(t) file (CSV, TXT, Tracker)",
+        "clicks": "Only if the tracker asks for it: click the bob or the pivot in the first frame",
+        "bob": "bob",
+        "pivot": "pivot",
+        "forget": "Forget clicks",
+        "mass": "Mass of the bob (kg)",
+        "length": "Length from pivot to bob centre (m)",
+        "radius": "Radius of the bob (m)",
+        "gravity": "g (m/s²)",
+        "slow": "Slow motion factor",
+        "go": "Make the report",
+        "open": "Open the report",
+        "all": "Download everything (zip)",
+        "working": "Working…",
+    },
+    "th": {
+        "title": "จากวิดีโอลูกตุ้มสู่รายงาน",
+        "upload": "วิดีโอ หรือไฟล์ θ(t) (CSV, TXT, Tracker)",
+        "clicks": "เฉพาะเมื่อโปรแกรมขอ: คลิกที่ลูกตุ้มหรือจุดแขวนในเฟรมแรก",
+        "bob": "ลูกตุ้ม",
+        "pivot": "จุดแขวน",
+        "forget": "ล้างการคลิก",
+        "mass": "มวลของลูกตุ้ม (kg)",
+        "length": "ความยาวจากจุดแขวนถึงจุดศูนย์กลางลูกตุ้ม (m)",
+        "radius": "รัศมีของลูกตุ้ม (m)",
+        "gravity": "g (m/s²)",
+        "slow": "อัตราสโลว์โมชัน",
+        "go": "สร้างรายงาน",
+        "open": "เปิดรายงาน",
+        "all": "ดาวน์โหลดทั้งหมด (zip)",
+        "working": "กำลังทำงาน…",
+    },
+}
+
+
+@dataclass
+class _Visit:
+    """What one visitor has put in so far."""
+
+    folder: Path
+    recording: Path | None = None
+    clicks: dict[str, tuple[float, float]] = field(default_factory=dict)
+    stage: tuple[str, float] = ("", 0.0)
+
+
+def build_page() -> None:
+    """Lay out the page for one visitor."""
+    visit = _Visit(Path(tempfile.mkdtemp(prefix="pendulab-")))
+    ui.context.client.on_delete(lambda: shutil.rmtree(visit.folder, ignore_errors=True))
+
+    @ui.refreshable
+    def content(lang: str) -> None:
+        _content(visit, lang)
+
+    with ui.column().classes("w-full max-w-3xl mx-auto p-4 gap-4"):
+        choice = ui.toggle({"en": "English", "th": "ไทย"}, value="en").classes("self-end").mark("lang")
+        content("en")
+    choice.on_value_change(lambda event: content.refresh(event.value))
+
+
+def _content(visit: _Visit, lang: str) -> None:
+    words = _WORDS[lang]
+    ui.label(words["title"]).classes("text-2xl")
+    frame_place = ui.column().classes("w-full")
+
+    async def receive(event: events.UploadEventArguments) -> None:
+        path = visit.folder / Path(event.file.name).name
+        await event.file.save(path)
+        visit.recording, visit.clicks = path, {}
+        frame_place.clear()
+        try:
+            if is_video(path):
+                picture, size = await run.io_bound(_first_frame, path)
+                with frame_place:
+                    _frame(visit, words, picture, size)
+        except PendulabError as error:
+            ui.notify(str(error), type="negative", multi_line=True)
+
+    accept = ",".join(sorted(VIDEO_SUFFIXES | SERIES_SUFFIXES))
+    upload = ui.upload(label=words["upload"], auto_upload=True, on_upload=receive).props(f'accept="{accept}"')
+    upload.classes("w-full").move(target_index=1)
+    with ui.row().classes("w-full"):
+        mass = ui.number(words["mass"], min=0, format="%.6g")
+        length = ui.number(words["length"], min=0, format="%.6g")
+        radius = ui.number(words["radius"], min=0, format="%.6g")
+        gravity = ui.number(words["gravity"], value=9.80665, min=0, format="%.6g")
+        slow = ui.number(words["slow"], value=1, min=0, format="%.6g")
+    result = ui.column().classes("w-full")
+
+    async def go() -> None:
+        if visit.recording is None:
+            ui.notify(words["upload"])
+            return
+        result.clear()
+        button.disable()
+        with result:
+            text = ui.label(words["working"])
+            bar = ui.linear_progress(0.0, show_value=False)
+
+        def show_stage() -> None:
+            text.text, bar.value = visit.stage[0] or words["working"], visit.stage[1]
+
+        timer = ui.timer(0.2, show_stage)
+        try:
+            scene = Scene(
+                pendulum=Pendulum(mass.value or None, length.value or None, radius.value or None),
+                environment=Environment(g_m_per_s2=gravity.value or None),
+            )
+            await _analyse(visit, scene, lang, slow.value or 1.0, result, words)
+        except PendulabError as error:
+            result.clear()
+            with result:
+                ui.label(str(error)).classes("text-red-700 dark:text-red-300").mark("trouble")
+        finally:
+            timer.cancel()
+            button.enable()
+
+    button = ui.button(words["go"], on_click=go).mark("go")
+    button.move(target_index=-1)
+    result.move(target_index=-1)
+
+
+def _frame(visit: _Visit, words: dict[str, str], picture: str, size: tuple[int, int]) -> None:
+    ui.label(words["clicks"])
+    what = ui.toggle({"bob": words["bob"], "pivot": words["pivot"]}, value="bob")
+
+    def marks() -> str:
+        colours = {"bob": "#d55e00", "pivot": "#0072b2"}
+        radius = max(size) / 80
+        return "".join(
+            f'<circle cx="{x}" cy="{y}" r="{radius}" fill="none" stroke="{colours[name]}" stroke-width="{radius / 3}"/>'
+            for name, (x, y) in visit.clicks.items()
+        )
+
+    def click(event: events.MouseEventArguments) -> None:
+        visit.clicks[what.value] = (event.image_x, event.image_y)
+        image.content = marks()
+
+    def forget() -> None:
+        visit.clicks.clear()
+        image.content = ""
+
+    image = ui.interactive_image(picture, on_mouse=click, cross=True, sanitize=False).classes("w-full").mark("frame")
+    ui.button(words["forget"], on_click=forget).props("flat")
+
+
+async def _analyse(
+    visit: _Visit, scene: Scene, lang: str, fps_factor: float, result: Any, words: dict[str, str]
+) -> None:
+    assert visit.recording is not None
+    out = visit.folder / f"report-{uuid.uuid4().hex}"
+    measuring: dict[str, Any] = {}
+    if is_video(visit.recording):
+        measuring = {"fps_factor": fps_factor, **{name: visit.clicks.get(name) for name in ("bob", "pivot")}}
+
+    def progress(stage: str, fraction: float) -> None:
+        visit.stage = (stage, fraction)
+
+    analysis, _ = await run.io_bound(
+        lambda: make_report(
+            visit.recording, out, scene, lang=lang, overlay=visit.recording is not None, progress=progress, **measuring
+        )
+    )
+    archive = await asyncio.to_thread(shutil.make_archive, str(out), "zip", out)
+    address = f"/results/{out.name}"
+    app.add_static_files(address, out)
+    zip_address = app.add_static_file(local_file=archive, url_path=f"{address}.zip")
+    from toolkit.report.terminal import summary_lines
+
+    result.clear()
+    with result:
+        for line in summary_lines(analysis, lang):
+            ui.label(line)
+        ui.link(words["open"], f"{address}/report.html", new_tab=True).mark("report")
+        ui.link(words["all"], zip_address).mark("zip")
+
+
+def _first_frame(path: Path) -> tuple[str, tuple[int, int]]:
+    """The first frame as a data address, and its size in px."""
+    import cv2
+
+    from toolkit.video import open_video
+
+    frame = next(iter(open_video(path)))
+    coded = cv2.imencode(".jpg", frame.bgr, [cv2.IMWRITE_JPEG_QUALITY, 90])[1]
+    height, width = frame.luma.shape
+    return f"data:image/jpeg;base64,{base64.b64encode(coded.tobytes()).decode()}", (width, height)
