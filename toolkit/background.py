@@ -1,0 +1,78 @@
+"""What the picture is without the bob: a running mean of each pixel over the frames in which nothing covers it."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+
+class Background:
+    """Mean picture `mean` (h, w) float32 and in how many frames each pixel was seen, `seen` (h, w) float32."""
+
+    def __init__(self, shape: tuple[int, int], fill: float = 0.0) -> None:
+        self.mean = np.full(shape, fill, np.float32)
+        self.seen = np.zeros(shape, np.float32)
+
+    def add(
+        self,
+        plane: np.ndarray,
+        box: tuple[int, int, int, int],
+        bob: tuple[float, float, float],
+        pivot: tuple[float, float] | None,
+        gain: float = 1.0,
+        most: float = 60.0,
+    ) -> None:
+        """Take in the piece box = (x0, y0, x1, y1) of `plane`, whose first pixel is (x0, y0) of the whole frame.
+
+        The bob (x, y, radius to leave out) and the string to the pivot do not count. After `most` frames old ones
+        fade, so that slow changes of light are followed.
+        """
+        px, py = pivot if pivot is not None else (np.nan, np.nan)
+        _compiled()(plane, self.mean, self.seen, *box, *bob, px, py, 1.0 / gain, most)
+
+    def fill_gaps(self, box: tuple[int, int, int, int]) -> None:
+        """Give pixels of the box that were never seen the level of seen pixels near them (`seen` stays 0)."""
+        import cv2
+
+        x0, y0, x1, y1 = box
+        mean, seen = self.mean[y0:y1, x0:x1], self.seen[y0:y1, x0:x1]
+        known = (seen > 0).astype(np.float32)
+        if not known.any():
+            return
+        level = np.full_like(mean, float(mean[seen > 0].mean()))
+        for width in (81, 31, 11, 5):
+            weight = cv2.blur(known, (width, width))
+            near = cv2.blur(mean * known, (width, width)) / np.maximum(weight, 1e-6)
+            level = np.where(weight > 0.02, near, level)
+        np.copyto(mean, level, where=known == 0)
+
+
+@cache
+def _compiled() -> Any:
+    import numba
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def add(plane, mean, seen, x0, y0, x1, y1, bx, by, radius, px, py, factor, most):  # type: ignore[no-untyped-def]
+        has_string = not np.isnan(px)
+        ux, uy = px - bx, py - by
+        length = np.sqrt(ux * ux + uy * uy) + 1e-9
+        ux, uy = ux / length, uy / length
+        for y in range(y0, y1):
+            dy = y - by
+            for x in range(x0, x1):
+                dx = x - bx
+                if dx * dx + dy * dy < radius * radius:
+                    continue
+                if has_string:
+                    along = dx * ux + dy * uy
+                    if along > 0 and abs(dx * uy - dy * ux) < 4.0 + 0.25 * max(0.0, 2 * radius - along):
+                        continue
+                n = seen[y, x] + 1.0
+                if n > most:
+                    n = most
+                seen[y, x] = n
+                mean[y, x] += (plane[y - y0, x - x0] * factor - mean[y, x]) / n
+
+    return add

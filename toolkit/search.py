@@ -1,0 +1,141 @@
+"""Where might the bob be? Round things that move, found by letting moving edges vote for centres.
+
+An edge pixel that changes with time votes, for each radius, for the centre that lies that far along its gradient.
+Bobs collect a whole circle of votes, strings and soft shadows do not. Votes need no background, so a small swing
+(whose bob never uncovers its middle) is found like a large one.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Hypothesis(NamedTuple):
+    """A round moving thing: index into the sampled frames, centre and radius in full-frame px, bob darker (−1) or
+    brighter (+1) than the wall, and the fraction of the circle that voted."""
+
+    sample: int
+    x_px: float
+    y_px: float
+    radius_px: float
+    sign: int
+    score: float
+
+
+def shrink(plane: np.ndarray, factor: int) -> np.ndarray:
+    """`plane` averaged over factor × factor pixels, float32. Pixel (i, j) is centred on (i + ½)·factor − ½."""
+    import cv2
+
+    rows, columns = plane.shape[0] // factor, plane.shape[1] // factor
+    cut = plane[: rows * factor, : columns * factor]
+    if factor > 1:
+        cut = cv2.resize(np.ascontiguousarray(cut), (columns, rows), interpolation=cv2.INTER_AREA)
+    return cut.astype(np.float32)
+
+
+def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 8) -> list[Hypothesis]:
+    """Hypotheses, best first, from shrunken frames (h, w) float32 that `factor` has shrunk; needs three or more."""
+    import cv2
+
+    if len(samples) < 3:
+        return []
+    stack = np.stack(samples)
+    spread = np.ptp(stack, axis=0) if len(samples) < 5 else stack.std(axis=0)
+    noise = float(np.median(spread))
+    moving = cv2.dilate((spread > max(4 * noise, 2.0)).astype(np.uint8), np.ones((3, 3), np.uint8))
+    if not moving.any():
+        return []
+    found: list[Hypothesis] = []
+    biggest = 0.2 * min(stack.shape[1:])
+    radii = [r for r in 2.5 * 1.25 ** np.arange(16) if r <= biggest]
+    for k, picture in enumerate(samples):
+        gx = cv2.Sobel(picture, cv2.CV_32F, 1, 0, scale=0.125)
+        gy = cv2.Sobel(picture, cv2.CV_32F, 0, 1, scale=0.125)
+        size = np.hypot(gx, gy)
+        rows, columns = np.nonzero((moving > 0) & (size > max(2.0, 2 * noise)))
+        if rows.size < 8:
+            continue
+        length = size[rows, columns]
+        if rows.size > 4000:
+            keep = np.argpartition(length, -4000)[-4000:]
+            rows, columns, length = rows[keep], columns[keep], length[keep]
+        weight = np.sqrt(length / np.percentile(length, 90)).clip(0, 1)
+        nx, ny = gx[rows, columns] / length, gy[rows, columns] / length
+        for radius in radii:
+            bin_size = max(1.0, radius / 7)
+            for sign in (-1, 1):
+                x, y, votes = _vote(columns, rows, nx, ny, weight, sign * radius, bin_size, picture.shape)
+                score = votes / (2 * np.pi * radius)
+                found.append(
+                    Hypothesis(k, (x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5, radius * factor, sign, score)
+                )
+    found.sort(key=lambda h: -h.score)
+    return _distinct(found, most)
+
+
+def _distinct(found: list[Hypothesis], most: int) -> list[Hypothesis]:
+    """The best few that are not the same circle again; at most three of one radius and sign."""
+    kept: list[Hypothesis] = []
+    for h in found:
+        if len(kept) == most:
+            break
+        alike = [o for o in kept if o.sign == h.sign and 0.75 < o.radius_px / h.radius_px < 1.34]
+        near = any(np.hypot(o.x_px - h.x_px, o.y_px - h.y_px) < h.radius_px and o.sample == h.sample for o in kept)
+        if not near and len(alike) < 3:
+            kept.append(h)
+    return kept
+
+
+def _vote(
+    columns: np.ndarray,
+    rows: np.ndarray,
+    nx: np.ndarray,
+    ny: np.ndarray,
+    weight: np.ndarray,
+    reach: float,
+    bin_size: float,
+    shape: tuple[int, ...],
+) -> tuple[float, float, float]:
+    """Centre (shrunken px) with most votes at signed distance `reach` along the gradient, and how many it has."""
+    height, width = int(shape[0] / bin_size) + 3, int(shape[1] / bin_size) + 3
+    return tuple(_compiled()(columns, rows, nx, ny, weight, reach, bin_size, height, width))  # type: ignore[return-value]
+
+
+@cache
+def _compiled() -> Any:
+    import numba
+
+    @numba.njit(cache=True, nogil=True)
+    def vote(columns, rows, nx, ny, weight, reach, bin_size, height, width):  # type: ignore[no-untyped-def]
+        # a bright bob's gradient points inwards, a dark one's outwards: `reach` carries the sign
+        table = np.zeros((height, width), np.float32)
+        for i in range(columns.size):
+            u = int(np.floor((columns[i] + reach * nx[i]) / bin_size + 0.5)) + 1
+            v = int(np.floor((rows[i] + reach * ny[i]) / bin_size + 0.5)) + 1
+            if 0 < u < width - 1 and 0 < v < height - 1:
+                table[v, u] += weight[i]
+        best, at_u, at_v = -1.0, 1, 1
+        for v in range(1, height - 1):
+            for u in range(1, width - 1):
+                if table[v, u] > 0:
+                    total = 0.0
+                    for b in range(-1, 2):
+                        for a in range(-1, 2):
+                            total += table[v + b, u + a]
+                    if total > best:
+                        best, at_u, at_v = total, u, v
+        sum_u = sum_v = total = 0.0
+        for b in range(-1, 2):
+            for a in range(-1, 2):
+                w = table[at_v + b, at_u + a]
+                sum_u += w * (at_u + a)
+                sum_v += w * (at_v + b)
+                total += w
+        if total <= 0:
+            return 0.0, 0.0, 0.0
+        return (sum_u / total - 1) * bin_size, (sum_v / total - 1) * bin_size, total
+
+    return vote

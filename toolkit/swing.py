@@ -1,0 +1,249 @@
+"""The motion of a pendulum as a camera sees it, fitted to positions in the picture.
+
+θ'' = −ω² sin θ − 2γ θ' − β |θ'| θ' about a fixed pivot; the bob is at pivot + L (sin(θ + v), cos(θ + v)), v being the
+direction of the vertical in the picture. Used to predict hidden frames, to tell a pendulum from what is none, and to
+see how much the measured positions scatter. It is not the fit of the physics: that is `toolkit.fit`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+NAMES = ("pivot_x", "pivot_y", "length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0")
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A fitted motion. `values` (9,) in the order of `NAMES` (px, rad, 1/s², 1/s); the state is that at t0_s.
+
+    covariance : (9, 9) of the values, scaled by the scatter found; rows of parameters held fixed are zero.
+    rms_px : scatter per axis about the motion.
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    t0_s: float
+    rms_px: float
+
+    @property
+    def pivot_px(self) -> tuple[float, float]:
+        """The fitted pivot."""
+        return float(self.values[0]), float(self.values[1])
+
+    @property
+    def length_px(self) -> float:
+        """Pivot to bob centre."""
+        return float(self.values[2])
+
+    @property
+    def period_s(self) -> float:
+        """Period at small amplitude."""
+        return float(2 * np.pi / np.sqrt(max(self.values[4], 1e-9)))
+
+    def angle(self, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """θ (rad, from the fitted vertical) and θ' (rad/s) at times t_s (n,), sorted or not."""
+        t = np.atleast_1d(np.asarray(t_s, float)) - self.t0_s
+        out = np.empty((2, t.size))
+        ahead = np.argsort(t, kind="stable")
+        forward = ahead[t[ahead] >= 0]
+        backward = ahead[t[ahead] < 0][::-1]
+        for order in (forward, backward):
+            if order.size:
+                out[:, order] = _solve(self.values, t[order])
+        return out[0], out[1]
+
+    def position(self, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """x, y in px at times t_s."""
+        theta, _ = self.angle(t_s)
+        return _place(self.values, theta)
+
+    def velocity(self, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """dx/dt, dy/dt in px/s at times t_s."""
+        theta, rate = self.angle(t_s)
+        direction = theta + self.values[3]
+        speed = self.values[2] * rate
+        return speed * np.cos(direction), -speed * np.sin(direction)
+
+    def amplitude_rad(self, t_s: np.ndarray) -> float:
+        """Largest |θ| at the given times."""
+        return float(np.max(np.abs(self.angle(t_s)[0])))
+
+
+def _place(values: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    direction = theta + values[3]
+    return values[0] + values[2] * np.sin(direction), values[1] + values[2] * np.cos(direction)
+
+
+@cache
+def _compiled() -> Any:
+    import numba
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def swing_rk4(w2, gamma, beta, theta, rate, t, out):  # type: ignore[no-untyped-def]
+        now = 0.0
+        longest = 0.06 / np.sqrt(abs(w2) + 1e-12)
+        for i in range(t.size):
+            span = t[i] - now
+            n = int(np.ceil(abs(span) / longest))
+            h = span / n if n > 0 else 0.0
+            for _ in range(n):
+                a1 = -w2 * np.sin(theta) - (2 * gamma + beta * abs(rate)) * rate
+                v2 = rate + 0.5 * h * a1
+                a2 = -w2 * np.sin(theta + 0.5 * h * rate) - (2 * gamma + beta * abs(v2)) * v2
+                v3 = rate + 0.5 * h * a2
+                a3 = -w2 * np.sin(theta + 0.5 * h * v2) - (2 * gamma + beta * abs(v3)) * v3
+                v4 = rate + h * a3
+                a4 = -w2 * np.sin(theta + h * v3) - (2 * gamma + beta * abs(v4)) * v4
+                theta += h / 6 * (rate + 2 * v2 + 2 * v3 + v4)
+                rate += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+            now = t[i]
+            out[0, i] = theta
+            out[1, i] = rate
+
+    return swing_rk4
+
+
+def _solve(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    out = np.empty((2, t.size))
+    _compiled()(values[4], values[5], values[6], values[7], values[8], np.ascontiguousarray(t), out)
+    return out
+
+
+def fit_swing(
+    t_s: np.ndarray,
+    x_px: np.ndarray,
+    y_px: np.ndarray,
+    sigma_px: np.ndarray,
+    start: np.ndarray,
+    *,
+    free: tuple[str, ...] = NAMES,
+    prior: dict[str, tuple[float, float]] | None = None,
+    turns: int = 25,
+) -> Swing | None:
+    """Least squares of the motion to positions (n,) with standard uncertainties, from `start` (9,).
+
+    Levenberg–Marquardt with forward differences; names that are not in `free` keep their start. `prior` maps a name
+    to (value, σ). None where it does not converge to finite numbers.
+    """
+    t = np.asarray(t_s, float)
+    t0 = float(t[0])
+    t = t - t0
+    weight = 1 / np.asarray(sigma_px, float)
+    index = [NAMES.index(name) for name in free]
+    tied = {NAMES.index(name): pair for name, pair in (prior or {}).items() if name in free}
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        x, y = _place(values, _solve(values, t)[0])
+        pulls = [(values[i] - value) / sigma for i, (value, sigma) in tied.items()]
+        return np.concatenate([(x - x_px) * weight, (y - y_px) * weight, pulls])
+
+    values = np.array(start, float)
+    scale = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-6 * abs(values[4]), 1e-6, 1e-6, 1e-6, 1e-6])
+    now = rest(values)
+    cost = float(now @ now)
+    if not np.isfinite(cost):
+        return None
+    damping = 1e-3
+    jacobian = np.empty((now.size, len(index)))
+    for _ in range(turns):
+        for column, i in enumerate(index):
+            moved = values.copy()
+            moved[i] += scale[i]
+            jacobian[:, column] = (rest(moved) - now) / scale[i]
+        normal, pull = jacobian.T @ jacobian, jacobian.T @ now
+        done = False
+        for _ in range(8):
+            try:
+                step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-300), pull)
+            except np.linalg.LinAlgError:
+                return None
+            trial = values.copy()
+            trial[index] += step
+            after = rest(trial)
+            trial_cost = float(after @ after)
+            if np.isfinite(trial_cost) and trial_cost <= cost:
+                done = cost - trial_cost <= 1e-7 * cost
+                values, now, cost = trial, after, trial_cost
+                damping = max(damping / 10, 1e-12)
+                break
+            damping *= 10
+        else:
+            break
+        if done:
+            break
+    dof = max(1, 2 * t.size - len(index))
+    chi2 = float(now[: 2 * t.size] @ now[: 2 * t.size])
+    covariance = np.zeros((9, 9))
+    try:
+        covariance[np.ix_(index, index)] = np.linalg.inv(normal) * max(chi2 / dof, 1e-300)
+    except np.linalg.LinAlgError:
+        return None
+    x, y = _place(values, _solve(values, t)[0])
+    rms = float(np.sqrt((np.sum((x - x_px) ** 2) + np.sum((y - y_px) ** 2)) / dof))
+    return Swing(values, covariance, t0, rms) if np.all(np.isfinite(values)) else None
+
+
+def fit_circle(x: np.ndarray, y: np.ndarray, weight: np.ndarray | None = None) -> tuple[float, float, float, float]:
+    """Centre x, y, radius and rms distance of the circle through points: Taubin's algebraic fit, then Gauss–Newton
+    on the geometric distance. Points on a line give an infinite radius."""
+    w = np.ones(x.size) if weight is None else weight / weight.mean()
+    mx, my = np.average(x, weights=w), np.average(y, weights=w)
+    dx, dy = x - mx, y - my
+    z = dx * dx + dy * dy
+    mz = np.average(z, weights=w)
+    if not mz > 0:
+        return float(mx), float(my), 0.0, 0.0
+    design = np.column_stack([(z - mz) / (2 * np.sqrt(mz)), dx, dy]) * np.sqrt(w)[:, None]
+    a, b, c = np.linalg.svd(design, full_matrices=False)[2][2]
+    a = a / (2 * np.sqrt(mz))
+    if abs(a) < 1e-12 * np.hypot(b, c):
+        return float("inf"), float("inf"), float("inf"), float(np.sqrt(np.average((b * dx + c * dy) ** 2, weights=w)))
+    p = np.array([mx - b / (2 * a), my - c / (2 * a), np.sqrt(b * b + c * c + 4 * a * a * mz) / (2 * abs(a))])
+    for _ in range(10):
+        ex, ey = x - p[0], y - p[1]
+        d = np.hypot(ex, ey)
+        jacobian = np.column_stack([-ex / d, -ey / d, -np.ones(x.size)]) * np.sqrt(w)[:, None]
+        try:
+            step = np.linalg.lstsq(jacobian, -(d - p[2]) * np.sqrt(w), rcond=None)[0]
+        except np.linalg.LinAlgError:
+            break
+        p += step
+        if np.abs(step).max() < 1e-9 * p[2]:
+            break
+    rest = np.hypot(x - p[0], y - p[1]) - p[2]
+    return float(p[0]), float(p[1]), float(p[2]), float(np.sqrt(np.average(rest**2, weights=w)))
+
+
+def start_swing(t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray | None:
+    """A start (9,) for `fit_swing` from positions alone: circle, then θ'' = −ω² sin(θ) by weak (integrated) form.
+
+    None where the positions lie on no arc with its centre above them.
+    """
+    t = np.asarray(t_s, float) - t_s[0]
+    cx, cy, length, _ = fit_circle(x_px, y_px)
+    spread = max(float(np.ptp(x_px)), float(np.ptp(y_px)))
+    if not np.isfinite(length) or length > 40 * spread:
+        length = 5 * spread  # too flat to tell: any long pendulum will do as a start
+        cx, cy = float(np.mean(x_px)), float(np.mean(y_px)) - length
+    if cy > np.mean(y_px):
+        return None
+    direction = np.unwrap(np.arctan2(x_px - cx, y_px - cy))
+    # θ(t) = θ0 + rate0 t − ω² ∫∫ sin(θ − v): linear in (θ0, rate0, ω² cos v, ω² sin v)
+    s2 = _twice_integrated(t, np.sin(direction))
+    c2 = _twice_integrated(t, np.cos(direction))
+    design = np.column_stack([np.ones(t.size), t, -s2, c2])
+    d0, rate0, wc, ws = np.linalg.lstsq(design, direction, rcond=None)[0]
+    w2, vertical = float(np.hypot(wc, ws)), float(np.arctan2(ws, wc))
+    if wc <= 0:
+        return None
+    return np.array([cx, cy, length, vertical, w2, 0.0, 0.0, d0 - vertical, rate0])
+
+
+def _twice_integrated(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    step = np.diff(t)
+    once = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * step)])
+    return np.concatenate([[0.0], np.cumsum(0.5 * (once[1:] + once[:-1]) * step)])

@@ -1,0 +1,355 @@
+"""Any video as a stream of frames with their true time stamps.
+
+PyAV decodes (its luma plane is handed on without a copy), OpenCV is the fallback where PyAV is missing or cannot
+open the file, and a folder of numbered pictures is a video too. The header's frame count and rate are never used
+for timing; what is odd about the clock is said in `clock_warnings`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from toolkit.errors import JobError, UsageError
+
+_PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+# 8-bit formats whose plane 0 is the luma itself
+_LUMA_FIRST = re.compile(r"^(yuvj?4\d\dp|yuva4\d\dp|nv12|nv21|nv16|gray|gray8)$")
+_DEEP_LUMA = re.compile(r"^(?:yuva?4\d\dp|gray)(9|10|12|14|16)le$")
+
+
+class Frame:
+    """One decoded frame, turned upright.
+
+    index : counts decoded frames from 0.    t_s : its time stamp, the first decoded frame's being 0.
+    luma : (height, width) uint8, often a view into the decoder's memory: read it, do not write it.
+    """
+
+    __slots__ = ("_colour", "index", "luma", "t_s")
+
+    def __init__(self, index: int, t_s: float, luma: np.ndarray, colour: Callable[[str], Any]) -> None:
+        self.index, self.t_s, self.luma, self._colour = index, t_s, luma, colour
+
+    @property
+    def bgr(self) -> np.ndarray:
+        """(height, width, 3) uint8 in OpenCV's order, converted when asked for."""
+        return self._colour("bgr")
+
+    @property
+    def chroma(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """The two colour-difference planes (uint8, often half the size), or None for a grey picture."""
+        return self._colour("chroma")
+
+
+@dataclass(frozen=True)
+class Video:
+    """A video that can be iterated any number of times; each time decodes the file anew.
+
+    fps_header is what the file claims (None where it does not); `time_source` says where time stamps come from:
+    `pts` (the file's own), `opencv`, `frame rate` (none in the file: index/fps) or `pictures`.
+    """
+
+    path: Path
+    width_px: int
+    height_px: int
+    fps_header: float | None
+    codec: str
+    time_source: str
+    rotation_deg: int = 0
+    full_range: bool = False
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    _frames: Callable[[], Iterator[Frame]] = field(default=lambda: iter(()), repr=False, compare=False)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self._frames()
+
+
+def open_video(path: str | Path, fps: float | None = None) -> Video:
+    """Open a video file (whatever PyAV or OpenCV decode) or a folder of pictures (`fps`, or 30 if not given).
+
+    Raises JobError where there is nothing to decode: missing, empty, not a video, broken, no picture in it.
+    """
+    path = Path(path)
+    if fps is not None and not (np.isfinite(fps) and fps > 0):
+        raise UsageError(f"fps must be a positive number, got {fps}")
+    if not path.exists():
+        raise JobError(f"video {path} does not exist; check the name")
+    if path.is_dir():
+        return _open_pictures(path, fps)
+    if path.stat().st_size == 0:
+        raise JobError(f"video {path} is empty (0 bytes); copy it from the phone again")
+    try:
+        import av  # noqa: F401
+    except ImportError:
+        return _open_opencv(path)
+    try:
+        return _open_pyav(path)
+    except JobError:
+        raise
+    except Exception as error:  # PyAV raises many kinds; the fallback decides
+        try:
+            return _open_opencv(path)
+        except JobError:
+            raise JobError(f"{path} cannot be read as a video ({_one_line(error)}); {_REMEDY}") from error
+
+
+_REMEDY = "record it again or convert it to mp4 (H.264)"
+
+
+def _one_line(error: BaseException) -> str:
+    text = str(getattr(error, "strerror", "") or error).strip().splitlines()
+    return text[0] if text else type(error).__name__
+
+
+# --- PyAV ---------------------------------------------------------------------------------------------------------
+
+
+def _open_pyav(path: Path) -> Video:
+    import av
+
+    with av.open(str(path)) as container:
+        if not container.streams.video:
+            raise JobError(f"{path} holds no video stream; give a video file")
+        stream = container.streams.video[0]
+        metadata = {str(k): str(v) for k, v in {**container.metadata, **stream.metadata}.items()}
+        fps = float(stream.average_rate) if stream.average_rate else None
+        first = next(iter(container.decode(stream)), None)  # a header alone proves nothing
+        if first is None:
+            raise JobError(f"{path} holds no frame that can be decoded; {_REMEDY}")
+        rotation = _rotation(first, metadata)
+        size = (first.width, first.height) if rotation % 180 == 0 else (first.height, first.width)
+        stamped = first.pts is not None
+        full = int(getattr(first, "color_range", 0) or 0) == 2 or first.format.name.startswith("yuvj")
+        codec = stream.codec_context.name
+    warnings = [] if stamped else ["the file has no time stamps; frame number / frame rate is used instead"]
+    return Video(
+        path=path,
+        width_px=size[0],
+        height_px=size[1],
+        fps_header=fps,
+        codec=codec,
+        time_source="pts" if stamped else "frame rate",
+        rotation_deg=rotation,
+        full_range=full,
+        metadata=metadata,
+        warnings=tuple(warnings),
+        _frames=lambda: _decode_pyav(path, rotation, fps),
+    )
+
+
+def _rotation(frame: Any, metadata: Mapping[str, str]) -> int:
+    """Degrees, counter-clockwise, by which the picture is to be turned to stand upright."""
+    turn = getattr(frame, "rotation", None)
+    if turn is None:
+        try:
+            turn = -int(float(metadata.get("rotate", "0")))
+        except ValueError:
+            turn = 0
+    return round(turn / 90) * 90 % 360
+
+
+def _decode_pyav(path: Path, rotation: int, fps: float | None) -> Iterator[Frame]:
+    import av
+
+    turns = rotation // 90
+    first: float | None = None
+    index = 0
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        stream.thread_type = "AUTO"
+        base = float(stream.time_base) if stream.time_base else 0.0
+        frames = iter(container.decode(stream))
+        while True:
+            try:
+                picture = next(frames, None)
+            except av.error.FFmpegError as error:
+                if index < 2:
+                    raise JobError(
+                        f"{path} breaks off after {index} frame(s) ({_one_line(error)}); {_REMEDY}"
+                    ) from error
+                return  # the frames before the damage are good; the loss shows in the number of frames
+            if picture is None:
+                return
+            stamp = index / (fps or 30.0) if picture.pts is None else picture.pts * base
+            if first is None:
+                first = stamp
+            luma = _luma(picture)
+            yield Frame(index, stamp - first, np.rot90(luma, turns) if turns else luma, _colour_of(picture, turns))
+            index += 1
+
+
+def _luma(picture: Any) -> np.ndarray:
+    name = picture.format.name
+    if _LUMA_FIRST.match(name):
+        plane = picture.planes[0]
+        rows = np.frombuffer(plane, np.uint8)[: plane.height * plane.line_size].reshape(plane.height, plane.line_size)
+        return rows[:, : plane.width]
+    deep = _DEEP_LUMA.match(name)
+    if deep:
+        plane = picture.planes[0]
+        rows = np.frombuffer(plane, np.uint16).reshape(plane.height, plane.line_size // 2)[:, : plane.width]
+        bits = int(deep.group(1))
+        return np.minimum((rows.astype(np.uint32) + (1 << (bits - 9))) >> (bits - 8), 255).astype(np.uint8)
+    return np.ascontiguousarray(picture.to_ndarray(format="gray"))
+
+
+def _colour_of(picture: Any, turns: int) -> Callable[[str], Any]:
+    def colour(kind: str) -> Any:
+        if kind == "bgr":
+            return np.ascontiguousarray(np.rot90(picture.to_ndarray(format="bgr24"), turns))
+        name = picture.format.name
+        if name.startswith("gray"):
+            return None
+        source = picture if re.match(r"^yuvj?4\d\dp$", name) else picture.reformat(format="yuv444p")
+        planes = []
+        for plane in (source.planes[1], source.planes[2]):
+            rows = np.frombuffer(plane, np.uint8)[: plane.height * plane.line_size]
+            planes.append(np.rot90(rows.reshape(plane.height, plane.line_size)[:, : plane.width], turns))
+        return planes[0], planes[1]
+
+    return colour
+
+
+# --- OpenCV and pictures ------------------------------------------------------------------------------------------
+
+
+def _open_opencv(path: Path) -> Video:
+    import cv2
+
+    capture = cv2.VideoCapture(str(path))
+    good, picture = capture.read()
+    fps = capture.get(cv2.CAP_PROP_FPS)
+    capture.release()
+    if not good:
+        raise JobError(f"{path} cannot be read as a video; {_REMEDY}")
+    return Video(
+        path=path,
+        width_px=picture.shape[1],
+        height_px=picture.shape[0],
+        fps_header=fps if fps > 0 else None,
+        codec="opencv",
+        time_source="opencv",
+        full_range=True,
+        _frames=lambda: _decode_opencv(path),
+    )
+
+
+def _decode_opencv(path: Path) -> Iterator[Frame]:
+    import cv2
+
+    capture = cv2.VideoCapture(str(path))
+    try:
+        first, index = None, 0
+        while True:
+            good, picture = capture.read()
+            if not good:
+                return
+            stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
+            first = stamp if first is None else first
+            yield _from_bgr(index, stamp - first, picture)
+            index += 1
+    finally:
+        capture.release()
+
+
+def _open_pictures(folder: Path, fps: float | None) -> Video:
+    import cv2
+
+    names = sorted((p for p in folder.iterdir() if p.suffix.lower() in _PICTURES), key=_natural)
+    if not names:
+        raise JobError(f"{folder} is a folder without pictures; give a video file or a folder of numbered pictures")
+    picture = cv2.imread(str(names[0]))
+    if picture is None:
+        raise JobError(f"{names[0]} cannot be read as a picture; save the frames as PNG")
+    rate = fps or 30.0
+    said = () if fps else ("pictures carry no time stamps: 30 frames per second is assumed",)
+    return Video(
+        path=folder,
+        width_px=picture.shape[1],
+        height_px=picture.shape[0],
+        fps_header=rate,
+        codec="pictures",
+        time_source="pictures",
+        full_range=True,
+        warnings=said,
+        _frames=lambda: _read_pictures(names, rate, picture.shape),
+    )
+
+
+def _natural(path: Path) -> list[tuple[int, int | str]]:
+    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", path.name) if part]
+
+
+def _read_pictures(names: list[Path], rate: float, shape: tuple[int, ...]) -> Iterator[Frame]:
+    import cv2
+
+    for index, name in enumerate(names):
+        picture = cv2.imread(str(name))
+        if picture is None or picture.shape != shape:
+            raise JobError(f"{name} is not a picture of {shape[1]}×{shape[0]} px like the first; leave it out")
+        yield _from_bgr(index, index / rate, picture)
+
+
+def _from_bgr(index: int, t_s: float, picture: np.ndarray) -> Frame:
+    import cv2
+
+    def colour(kind: str) -> Any:
+        if kind == "bgr":
+            return picture
+        planes = cv2.cvtColor(picture, cv2.COLOR_BGR2YCrCb)
+        return np.ascontiguousarray(planes[:, :, 2]), np.ascontiguousarray(planes[:, :, 1])
+
+    return Frame(index, t_s, cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), colour)
+
+
+# --- the clock ----------------------------------------------------------------------------------------------------
+
+
+def clock_warnings(t_s: np.ndarray, video: Video) -> list[str]:
+    """What is odd about the time stamps `t_s` (n,) of all decoded frames: sentences, none for a sound clock."""
+    said: list[str] = []
+    if t_s.size < 3:
+        return said
+    steps = np.diff(t_s)
+    if np.all(steps == 0):
+        return ["all time stamps are equal: the clock of this file is broken; convert it with its frame rate set"]
+    backwards = int(np.sum(steps <= 0))
+    if backwards:
+        said.append(f"{backwards} time stamps do not increase: the clock of this file is suspicious")
+    forward = steps[steps > 0]
+    typical = float(np.median(forward))
+    jumps = np.flatnonzero(steps > 1.5 * typical)
+    if jumps.size > 0.2 * steps.size:
+        said.append(
+            f"the frame rate varies (steps of {forward.min() * 1e3:.1f} to {forward.max() * 1e3:.1f} ms); "
+            "the true time stamps are used"
+        )
+    elif jumps.size:
+        missing = int(np.round(steps[jumps] / typical - 1).sum())
+        said.append(
+            f"{missing} frame(s) are missing at {jumps.size} place(s), first at t = {t_s[jumps[0]]:.3f} s; "
+            "the time stamps account for them"
+        )
+    fps = 1 / typical
+    if video.fps_header and video.time_source == "pts" and not jumps.size and abs(video.fps_header / fps - 1) > 0.02:
+        said.append(f"the header claims {video.fps_header:.4g} frames per second, the time stamps give {fps:.4g}")
+    capture = _capture_fps(video.metadata)
+    if capture and capture > 1.2 * fps:
+        said.append(
+            f"slow motion: recorded at {capture:g} frames per second and stored at {fps:.4g}; "
+            f"give --fps-factor {capture / fps:.4g} to restore true time"
+        )
+    return said
+
+
+def _capture_fps(metadata: Mapping[str, str]) -> float | None:
+    try:
+        return float(metadata["com.android.capture.fps"])
+    except (KeyError, ValueError):
+        return None
