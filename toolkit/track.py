@@ -104,7 +104,9 @@ def write_track_csv(track: Track, path: str | Path) -> None:
         file.write("frame,t_s,x_px,y_px,sigma_x_px,sigma_y_px,status\n")
         columns = zip(track.frame, track.t_s, track.x_px, track.y_px, track.sigma_x_px, track.sigma_y_px, track.status)
         for frame, t, x, y, sx, sy, status in columns:
-            numbers = ",".join("" if not np.isfinite(v) else f"{v:.6g}" if v in (sx, sy) else f"{v:.5f}" for v in (x, y, sx, sy))
+            numbers = ",".join(
+                "" if not np.isfinite(v) else f"{v:.6g}" if v in (sx, sy) else f"{v:.5f}" for v in (x, y, sx, sy)
+            )
             file.write(f"{frame},{t:.9g},{numbers},{status}\n")
 
 
@@ -182,7 +184,9 @@ class _Job:
                     break
         if best is None:
             if not hypotheses:
-                raise JobError(f"nothing that moves was found in {self.video.path}; film the swinging bob, or {_REMEDY}")
+                raise JobError(
+                    f"nothing that moves was found in {self.video.path}; film the swinging bob, or {_REMEDY}"
+                )
             raise JobError(f"nothing in {self.video.path} moves like a pendulum; if there is one, {_REMEDY}")
         rough = best[1]
         self.look, self.swing = rough.look, rough.swing
@@ -225,7 +229,7 @@ class _Job:
             i = start + way
             while 0 <= i < len(batch) and misses < 4:
                 gx, gy = _extrapolate(recent, batch[i].t_s)
-                fit = self._flat_fit(batch[i], look, Guess(gx, gy), calibrate=False, soften=2.5, turns=4)
+                fit = self._flat_fit(batch[i], look, Guess(gx, gy), calibrate=False, soften=2.5, turns=12)
                 if fit is not None:
                     fit = self._flat_fit(batch[i], look, Guess(fit[0], fit[1]), calibrate=True, turns=6)
                 alike = fit is not None and (
@@ -264,9 +268,7 @@ class _Job:
         score = len(points) / len(batch) * quality * radius**0.5 / (0.3 + swing.rms_px)
         return _Rough(look, swing, {i: points[i] for i in order}, score)
 
-    def _flat_fit(
-        self, frame: Frame, look: Look, guess: Guess, **how: Any
-    ) -> tuple[float, float, Look] | None:
+    def _flat_fit(self, frame: Frame, look: Look, guess: Guess, **how: Any) -> tuple[float, float, Look] | None:
         """Disc fit against a wall of one level (the median of the patch's rim)."""
         patch = self._cut(frame, guess, 1.6 * look.radius_px + 6)
         if patch is None:
@@ -384,10 +386,15 @@ class _Job:
         place = NOWHERE
         if patch is not None:
             if self.hidden or len(self.recent) < 3:
-                wide = fit_disc(patch, self.look._replace(noise=np.inf), guess, soften=2.5, turns=4)
+                wide = fit_disc(patch, self.look._replace(noise=np.inf), guess, soften=2.5, turns=10)
                 if wide is not None:
                     guess = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
             place = self.localiser.locate(patch, self.look, guess)
+            if not np.isfinite(place.x_px):
+                wide = fit_disc(patch, self.look._replace(noise=np.inf), guess, soften=3.0, turns=12)
+                if wide is not None:
+                    near = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
+                    place = self.localiser.locate(patch, self.look, near)
         ok = self._accept(place, x, y)
         self.index.append(frame.index)
         self.t.append(t)
@@ -460,7 +467,7 @@ class _Job:
         t = t - t[0]
         x, y = np.array(self.x), np.array(self.y)
         sx, sy = np.array(self.sx), np.array(self.sy)
-        status = np.array(self.state)
+        status = np.array(self.state, dtype="U9")
         good = status == OK
         if good.sum() < max(8, 0.3 * good.size):
             raise JobError(
@@ -537,7 +544,9 @@ class _Job:
                 break
             stop = t[chosen[0]] + 2.5 * (stop - t[chosen[0]])
         if swing is None:
-            raise JobError(f"what moves in {self.video.path} does not swing like a pendulum; if there is one, {_REMEDY}")
+            raise JobError(
+                f"what moves in {self.video.path} does not swing like a pendulum; if there is one, {_REMEDY}"
+            )
         return swing
 
 
@@ -562,9 +571,7 @@ def _extrapolate(recent: list[tuple[float, float, float]], t: float) -> tuple[fl
     return x, y
 
 
-def _require_pendulum(
-    swing: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray, path: Path
-) -> None:
+def _require_pendulum(swing: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray, path: Path) -> None:
     span = float(t[good][-1] - t[good][0])
     if span < 0.5 * swing.period_s:
         raise JobError(

@@ -52,8 +52,9 @@ def compiled() -> Any:
         count = 0
         weights = 0.0
         wall = 0.0
+        last = False
         for turn in range(turns + 1):
-            last = turn == turns
+            last = last or turn == turns
             normal[:] = 0.0
             right[:] = 0.0
             good[:] = 0.0
@@ -188,6 +189,12 @@ def compiled() -> Any:
                 soft = min(max(soft + damp * step[7], 0.8), 1.2 * radius)
             if not (0.0 <= cx <= columns - 1.0 and 0.0 <= cy <= rows - 1.0):
                 return False
+            still = size < 0.02
+            if free > 6:
+                still = still and abs(step[6]) < 0.02 and abs(step[7]) < 0.05
+            if turn + 1 == turns and not still and free == 6 and not (damp == 1.0 and size < 0.3):
+                return False  # it has not arrived
+            last = still
         # covariance of (cx, cy): solve for the first two unit vectors
         for which in range(2):
             for a in range(free):
@@ -225,7 +232,7 @@ def compiled() -> Any:
 
 
 def fit_disc(
-    patch: Patch, look: Look, guess: Guess, *, calibrate: bool = False, turns: int = 3, soften: float = 1.0
+    patch: Patch, look: Look, guess: Guess, *, calibrate: bool = False, turns: int = 7, soften: float = 1.0
 ) -> np.ndarray | None:
     """(cx, cy, R, s, var_x, var_y, cov_xy, misfit, visible, contrast, gain, pixels, wall) in patch pixels, or None.
 

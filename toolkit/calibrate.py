@@ -1,0 +1,282 @@
+"""From where the bob was in the picture to θ(t): the pivot, the vertical and the error bars.
+
+Pivot: the centre of the arc (geometric least squares; for N points of scatter σ over ±θ₀ about the vertical the
+length is known to σ_L = 4√2·σ/(√N·θ₀²)·… of the arc's sagitta) and, where the string was seen, the point in which its
+lines meet. Vertical: the middle of the swing, from a fit that allows for decay. An error of the pivot along the
+vertical scales all angles alike, so it is kept apart from the random σ of each frame.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from toolkit.errors import JobError, UsageError
+from toolkit.output import whole_file
+from toolkit.scene import Scene
+from toolkit.series import ThetaSeries
+from toolkit.swing import fit_circle, fit_swing, start_swing
+from toolkit.track import LOST, PREDICTED, Track
+
+_CLICK_SIGMA_PX = 1.0
+
+
+@dataclass(frozen=True)
+class PivotEstimate:
+    """A pivot (x, y) in px with its (2, 2) covariance, how it was found, and the goodness of that fit."""
+
+    xy: np.ndarray
+    covariance: np.ndarray
+    method: str
+    reduced_chi2: float = 1.0
+
+    @property
+    def sigma_px(self) -> tuple[float, float]:
+        """Standard uncertainties of x and y."""
+        return float(np.sqrt(self.covariance[0, 0])), float(np.sqrt(self.covariance[1, 1]))
+
+
+def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
+    """θ(t) of the measured frames (predicted and lost ones are left out), with σ.
+
+    The σ of each frame is random; what is common to all is in the meta: `angle_scale_relative_u` (pivot along the
+    vertical) and `vertical_sigma_rad`. meta["calibration"] is the content of calibration.json.
+    Raises JobError where too few frames were measured or times do not increase.
+    """
+    t, x, y, sx, sy, kept = _measured(track)
+    log = list(track.meta.get("log", []))
+    warnings = list(track.meta.get("warnings", []))
+    pivot = _pivot(track, x, y, sx, sy, kept, log, warnings)
+    px, py = pivot.xy
+    direction = np.unwrap(np.arctan2(x - px, y - py))
+    distance = np.hypot(x - px, y - py)
+    length = float(np.median(distance))
+    vertical, vertical_sigma = _vertical(t, x, y, sx, sy, pivot, length)
+    theta = direction - vertical
+    sigma = np.hypot(np.cos(direction) * sx, np.sin(direction) * sy) / distance
+    scale_u = pivot.sigma_px[1] / length
+    amplitude = float(np.percentile(np.abs(theta), 99))
+    calibration: dict[str, Any] = {
+        "pivot_px": [float(px), float(py)],
+        "pivot_sigma_px": list(pivot.sigma_px),
+        "pivot_method": pivot.method,
+        "radius_px": float(track.radius_px),
+        "radius_sigma_px": float(track.meta.get("radius_sigma_px", 0.1)),
+        "vertical_rad": vertical,
+        "vertical_sigma_rad": vertical_sigma,
+        "length_px": length,
+        "length_sigma_px": pivot.sigma_px[1],
+        "fps": track.meta.get("fps"),
+        "time_source": track.meta.get("time_source"),
+        "frames": {
+            "ok": int(track.ok.sum()),
+            "predicted": int((track.status == PREDICTED).sum()),
+            "lost": int((track.status == LOST).sum()),
+        },
+        "localiser": track.localiser,
+        **_scale(scene, length, track.radius_px, warnings),
+    }
+    log.append(
+        f"Pivot at ({px:.2f}, {py:.2f}) px ± ({pivot.sigma_px[0]:.2f}, {pivot.sigma_px[1]:.2f}) px by {pivot.method}; "
+        f"pivot to bob {length:.2f} px."
+    )
+    log.append(
+        f"The vertical is the middle of the decaying swing: {np.degrees(vertical):.3f}° ± {np.degrees(vertical_sigma):.3f}° "
+        "from the picture's own."
+    )
+    log.append(
+        f"Angles up to {np.degrees(amplitude):.1f}°; random error of one frame {np.degrees(np.median(sigma)):.4f}°, "
+        f"common relative error of all angles {scale_u:.2g} (from the pivot)."
+    )
+    meta = {
+        "source": track.meta.get("source", "track"),
+        "log": log,
+        "warnings": warnings,
+        "angle_scale_relative_u": scale_u,
+        "vertical_sigma_rad": vertical_sigma,
+        "exposure_s": track.meta.get("exposure_s"),
+        "calibration": calibration,
+    }
+    if scene is not None and scene.pendulum.length_m is not None:
+        meta["length_m"] = scene.pendulum.length_m
+    return ThetaSeries(t, theta, np.maximum(sigma, 1e-9), meta)
+
+
+def write_calibration_json(series: ThetaSeries, path: str | Path) -> None:
+    """Write calibration.json, the calibration that `calibrate` put into the series' meta."""
+    content = series.meta.get("calibration")
+    if not isinstance(content, Mapping):
+        raise UsageError("this series holds no calibration; only a series from a video has one")
+    with whole_file(path) as scratch:
+        scratch.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _measured(track: Track) -> tuple[np.ndarray, ...]:
+    """t, x, y, σx, σy of the ok frames in the still frame of the background, and which frames these are."""
+    kept = np.flatnonzero(track.ok)
+    if kept.size < 8:
+        raise JobError(f"only {kept.size} frames were measured; an angle needs at least 8")
+    zero = np.zeros(track.t_s.size)
+    x = (track.x_px - np.asarray(track.meta.get("shift_x_px", zero)))[kept]
+    y = (track.y_px - np.asarray(track.meta.get("shift_y_px", zero)))[kept]
+    t = track.t_s[kept]
+    rising = np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])
+    if rising.sum() < 8:
+        raise JobError("the video's time stamps do not increase; convert it with a fixed frame rate")
+    kept = kept[rising]
+    return t[rising], x[rising], y[rising], track.sigma_x_px[kept], track.sigma_y_px[kept], kept
+
+
+def arc_pivot(x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray) -> PivotEstimate | None:
+    """The centre of the arc through points (n,) with standard uncertainties; None where they do not bend."""
+    cx, cy, radius, _ = fit_circle(x, y, 1 / (sx * sy))
+    if not np.isfinite(radius):
+        return None
+    ux, uy = (x - cx) / radius, (y - cy) / radius
+    sigma = np.hypot(ux * sx, uy * sy)
+    rest = (np.hypot(x - cx, y - cy) - radius) / sigma
+    jacobian = np.column_stack([-ux, -uy, -np.ones(x.size)]) / sigma[:, None]
+    chi2 = float(rest @ rest) / max(1, x.size - 3)
+    try:
+        covariance = np.linalg.inv(jacobian.T @ jacobian) * max(1.0, chi2)
+    except np.linalg.LinAlgError:
+        return None
+    return PivotEstimate(np.array([cx, cy]), covariance[:2, :2], "the arc of the bob", chi2)
+
+
+def line_pivot(x: np.ndarray, y: np.ndarray, angle: np.ndarray, sigma: np.ndarray) -> PivotEstimate | None:
+    """The point nearest to lines (n,) through (x, y) with direction `angle` (rad from the downward image axis,
+    positive to the right) and `sigma` (px) their distance errors at the pivot. None for fewer than 8 lines."""
+    if x.size < 8:
+        return None
+    nx, ny = np.cos(angle), -np.sin(angle)
+    offset = nx * x + ny * y
+    weight = 1 / sigma**2
+    for _ in range(6):
+        normal = np.array(
+            [[np.sum(weight * nx * nx), np.sum(weight * nx * ny)], [np.sum(weight * nx * ny), np.sum(weight * ny * ny)]]
+        )
+        try:
+            covariance = np.linalg.inv(normal)
+        except np.linalg.LinAlgError:
+            return None
+        xy = covariance @ np.array([np.sum(weight * nx * offset), np.sum(weight * ny * offset)])
+        rest = (nx * xy[0] + ny * xy[1] - offset) / sigma
+        spread = 1.4826 * np.median(np.abs(rest)) + 1e-12
+        weight = np.where(np.abs(rest) < 4 * spread, 1 / sigma**2, 0.0)
+    used = weight > 0
+    chi2 = float(np.sum(rest[used] ** 2)) / max(1, int(used.sum()) - 2)
+    return PivotEstimate(xy, covariance * max(1.0, chi2), "the string's lines", chi2)
+
+
+def _pivot(
+    track: Track,
+    x: np.ndarray,
+    y: np.ndarray,
+    sx: np.ndarray,
+    sy: np.ndarray,
+    kept: np.ndarray,
+    log: list[str],
+    warnings: list[str],
+) -> PivotEstimate:
+    if track.meta.get("pivot_given"):
+        sigma = max(
+            _CLICK_SIGMA_PX, *(track.pivot_sigma_px if np.all(np.isfinite(track.pivot_sigma_px)) else (0.0, 0.0))
+        )
+        return PivotEstimate(np.array(track.pivot_px, float), np.eye(2) * sigma**2, "the position given")
+    arc = arc_pivot(x, y, sx, sy)
+    lines = _string_pivot(track, kept)
+    if arc is None and lines is None:
+        raise JobError("the bob's path does not bend and no string is seen: give --pivot X,Y")
+    if arc is None or lines is None:
+        return arc if lines is None else lines  # type: ignore[return-value]
+    difference = arc.xy - lines.xy
+    both = arc.covariance + lines.covariance
+    chi2 = float(difference @ np.linalg.solve(both, difference))
+    log.append(
+        f"The arc puts the pivot at ({arc.xy[0]:.2f}, {arc.xy[1]:.2f}) px, the string's lines at "
+        f"({lines.xy[0]:.2f}, {lines.xy[1]:.2f}) px."
+    )
+    gain = arc.covariance @ np.linalg.inv(both)
+    xy = arc.xy - gain @ difference
+    covariance = arc.covariance - gain @ arc.covariance
+    if chi2 > 11.8:  # 3σ for two numbers
+        warnings.append(
+            f"the pivot by the arc and by the string differ by {np.hypot(*difference):.1f} px ({np.sqrt(chi2):.0f}σ): "
+            "the camera was tilted, its lens distorts, or the bob swung out of the plane; angles may be scaled by about "
+            f"{abs(difference[1]) / np.hypot(*(np.mean([x, y], axis=1) - xy)):.1%}"
+        )
+        covariance = covariance * chi2 / 2
+    return PivotEstimate(xy, covariance, "the arc and the string's lines together")
+
+
+def _string_pivot(track: Track, kept: np.ndarray) -> PivotEstimate | None:
+    angle = track.meta.get("string_angle_rad")
+    if angle is None:
+        return None
+    sx, sy = (np.asarray(track.meta.get(f"shift_{a}_px", np.zeros(track.t_s.size))) for a in "xy")
+    u, x, y = (np.asarray(track.meta[f"string_{n}"])[kept] for n in ("angle_sigma_rad", "x_px", "y_px"))
+    a = np.asarray(angle)[kept]
+    good = np.isfinite(a) & np.isfinite(u)
+    if good.sum() < 8:
+        return None
+    reach = np.hypot(x - track.pivot_px[0], y - track.pivot_px[1])[good]
+    return line_pivot((x - sx[kept])[good], (y - sy[kept])[good], a[good], u[good] * reach + 1e-3)
+
+
+def _vertical(
+    t: np.ndarray, x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray, pivot: PivotEstimate, length: float
+) -> tuple[float, float]:
+    """Direction of rest in the picture and its σ: a decaying swing fitted with the pivot held."""
+    start = start_swing(t[: max(12, t.size // 8)], x[: max(12, t.size // 8)], y[: max(12, t.size // 8)])
+    direction = np.unwrap(np.arctan2(x - pivot.xy[0], y - pivot.xy[1]))
+    middle = float(0.5 * (direction.max() + direction.min()))
+    if start is None:
+        return middle, float(np.ptp(direction) / 20)
+    sigma = np.sqrt(sx * sy)
+    swing = None
+    part = 0.12
+    while True:
+        n = max(12, min(t.size, int(part * t.size)))
+        every = max(1, n // 2000)
+        start[0:3] = pivot.xy[0], pivot.xy[1], length
+        swing = fit_swing(
+            t[:n:every], x[:n:every], y[:n:every], sigma[:n:every], start,
+            free=("length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0"),
+        )  # fmt: skip
+        if swing is None or n == t.size:
+            break
+        start = swing.values.copy()
+        part *= 2
+    if swing is None or abs(swing.values[3] - middle) > 0.3 * np.ptp(direction):
+        return middle, float(np.ptp(direction) / 20)
+    across = pivot.sigma_px[0] / length  # a pivot error across the swing turns the vertical with it
+    del across
+    return float(swing.values[3]), float(np.sqrt(max(swing.covariance[3, 3], 1e-18)))
+
+
+def _scale(scene: Scene | None, length_px: float, radius_px: float, warnings: list[str]) -> dict[str, Any]:
+    """px_per_m from a known bob radius or length; both known and disagreeing is said."""
+    if scene is None:
+        return {}
+    pendulum = scene.pendulum
+    found: dict[str, Any] = {}
+    by_length = length_px / pendulum.length_m if pendulum.length_m else None
+    by_radius = radius_px / pendulum.bob_radius_m if pendulum.bob_radius_m else None
+    if by_length is not None:
+        found |= {"px_per_m": by_length, "px_per_m_from": "length_m"}
+    elif by_radius is not None:
+        found |= {"px_per_m": by_radius, "px_per_m_from": "bob_radius_m", "length_from_radius_m": length_px / by_radius}
+    if by_length is not None and by_radius is not None:
+        found["px_per_m_by_radius"] = by_radius
+        if abs(by_length / by_radius - 1) > 0.05:
+            warnings.append(
+                f"length_m gives {by_length:.0f} px per metre, bob_radius_m {by_radius:.0f}: one of them is wrong, or the "
+                "camera was tilted"
+            )
+    return found
