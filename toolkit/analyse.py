@@ -16,9 +16,7 @@ from toolkit.scene import Scene
 from toolkit.series import ThetaSeries
 from toolkit.track import Track
 
-VIDEO_SUFFIXES = frozenset(
-    {".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v", ".3gp", ".mpg", ".mpeg", ".wmv", ".mts"}
-)
+VIDEO_SUFFIXES = frozenset({".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v", ".3gp", ".mpg", ".mpeg", ".wmv", ".mts"})
 SERIES_SUFFIXES = frozenset({".csv", ".tsv", ".txt", ".dat", ".trk", ".trz", ".zip"})
 
 

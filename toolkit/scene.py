@@ -48,15 +48,11 @@ class Environment:
     fluid_viscosity_pa_s: float = 1.825e-5
 
     def __post_init__(self) -> None:
-        _require_positive(
-            "environment", self, "g_m_per_s2", "fluid_density_kg_per_m3", "fluid_viscosity_pa_s"
-        )
+        _require_positive("environment", self, "g_m_per_s2", "fluid_density_kg_per_m3", "fluid_viscosity_pa_s")
         if self.g_m_per_s2 is not None and self.latitude_deg is not None:
             raise UsageError("[environment] gives both g_m_per_s2 and latitude_deg; keep one of them")
         if self.latitude_deg is not None and not -90 <= self.latitude_deg <= 90:
-            raise UsageError(
-                f"[environment] latitude_deg must lie between -90 and 90, got {self.latitude_deg}"
-            )
+            raise UsageError(f"[environment] latitude_deg must lie between -90 and 90, got {self.latitude_deg}")
 
     @property
     def gravity_m_per_s2(self) -> float:
@@ -146,12 +142,8 @@ class Scene:
         for name in sections:
             if name not in kinds:
                 raise UsageError(f"unknown section [{name}]{did_you_mean(name, known)}")
-        parts: dict[str, Any] = {
-            name: _read_section(kinds[name], section, name) for name, section in sections.items()
-        }
-        return cls(
-            **parts, effects=_read_effects(effects), camera=None if camera is None else _read_camera(camera)
-        )
+        parts: dict[str, Any] = {name: _read_section(kinds[name], section, name) for name, section in sections.items()}
+        return cls(**parts, effects=_read_effects(effects), camera=None if camera is None else _read_camera(camera))
 
     def to_dict(self) -> dict[str, Any]:
         """Nested dicts of what is set (no None), as `from_dict` reads them."""
@@ -235,9 +227,7 @@ def _read_camera(table: Any) -> Camera:
         raise UsageError(f"[camera] must be a table of keys, got {table!r}")
     keys = {k: v for k, v in table.items() if not isinstance(v, Mapping)}
     used = {
-        name: camera.check_parameters(name, values)
-        for name, values in table.items()
-        if isinstance(values, Mapping)
+        name: camera.check_parameters(name, values) for name, values in table.items() if isinstance(values, Mapping)
     }
     return replace(_read_section(Camera, keys, "camera"), effects=used)
 
