@@ -44,7 +44,7 @@ _HOME = {
     "write_series": "series_io",
 }
 
-__all__ = [*_HOME]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:
