@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from toolkit.errors import PendulabError, UsageError
+from toolkit.progress import Progress, silent
+from toolkit.scene import Scene
+
+if TYPE_CHECKING:
+    from toolkit.series import ThetaSeries
 
 
 @dataclass(frozen=True)
@@ -60,3 +69,147 @@ class FitResult:
     def reduced_chi2(self) -> float:
         """χ² per degree of freedom."""
         return self.chi2 / self.dof if self.dof > 0 else float("nan")
+
+
+def fit(
+    series: ThetaSeries,
+    scene: Scene | None = None,
+    model: str = "full_linear_drag",
+    *,
+    free: Sequence[str] = (),
+    fixed: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | None = None,
+    priors: Mapping[str, float] | None = None,
+    loss: str = "linear",
+    time_sigma_s: float = 0.0,
+) -> FitResult:
+    """Fit one model to θ(t) and say how far to trust it.
+
+    free : names to free that are held otherwise: `length` (held at the scene's), `f0`, `f`, `drive_phase` of a drive.
+    fixed : name -> value to hold (`{"theta_offset": 0.0}`).    start : name -> first value, instead of the guess.
+    priors : name -> standard uncertainty of what was measured beforehand: `angle_scale` and `time_scale` (relative),
+        `length` in m, `theta_offset` in rad. `angle_scale` comes from the series' meta where it is there.
+    loss : "linear", or a robust one for outliers: "soft_l1", "huber", "cauchy".
+    time_sigma_s : standard uncertainty of each time; it adds (σ_t θ̇)² to each σ².
+
+    Drag coefficients are ≥ 0. Error bars allow for correlated residuals (see `toolkit.noise`). Poor data gives a
+    result with success False, a message and a remedy. Raises UsageError for unknown names or a scene that lacks what
+    the model needs.
+    """
+    from toolkit.problem import pose
+
+    began = time.process_time()
+    problem = pose(series, scene or Scene(), model, free, fixed or {}, priors, loss, time_sigma_s)
+    return replace(problem.solve(start or {}), cpu_s=time.process_time() - began)
+
+
+def fit_models(
+    series: ThetaSeries,
+    scene: Scene | None = None,
+    models: Sequence[str] | None = None,
+    *,
+    progress: Progress = silent,
+    **options: Any,
+) -> dict[str, FitResult]:
+    """Fit several models (default: the five of the ladder) so that they can be compared.
+
+    Where the series has no σ, all models are weighed with the scatter left by the best of them; where the residuals
+    are correlated, AIC and BIC of all use the number of points that are effectively independent under the best of
+    them. A given length that contradicts the record is freed for all models, with a warning. `options` go to `fit`.
+    """
+    from toolkit.models import STANDARD
+
+    scene = scene or Scene()
+    names = tuple(models or STANDARD)
+    fits: dict[str, FitResult] = {}
+    for i, name in enumerate(names):
+        progress("fitting", i / len(names))
+        given = {**_start_from(fits), **(options.get("start") or {})}
+        fits[name] = fit(
+            series, scene, name, **{**options, "start": given if name.startswith("full") else options.get("start")}
+        )
+    freed = _freed_length(series, scene, fits, options)
+    if freed is not None:
+        fits = freed
+    progress("fitting", 1.0)
+    return _compared(fits)
+
+
+def choose_model(fits: Mapping[str, FitResult]) -> str:
+    """The name of the preferred model: the simplest whose AIC is within 2 of the lowest, among those that converged."""
+    if not fits:
+        raise UsageError("there are no fits to choose from; fit at least one model")
+    good = {name: result for name, result in fits.items() if result.success} or dict(fits)
+    lowest = min(result.aic for result in good.values())
+    near = [name for name, result in good.items() if result.aic <= lowest + 2]
+    return min(near or list(good), key=lambda name: (len(good[name].free), good[name].aic))
+
+
+def _start_from(fits: Mapping[str, FitResult]) -> dict[str, float]:
+    """Where the next full-sine model starts: at the last one that converged."""
+    for name, result in reversed(list(fits.items())):
+        if result.success and name.startswith("full"):
+            return {key: p.value for key, p in result.parameters.items() if not p.fixed}
+    return {}
+
+
+def _freed_length(
+    series: ThetaSeries, scene: Scene, fits: dict[str, FitResult], options: Mapping[str, Any]
+) -> dict[str, FitResult] | None:
+    """All fits again with the length free, if the record contradicts the length given."""
+    held = {
+        n: r
+        for n, r in fits.items()
+        if n.startswith("full") and "length" in r.parameters and r.parameters["length"].fixed
+    }
+    if not held or "length" in (options.get("fixed") or {}):
+        return None
+    name = min(held, key=lambda n: held[n].chi2)
+    loose = {**options, "free": (*options.get("free", ()), "length")}
+    trial = fit(series, scene, name, **loose)
+    if not trial.success:
+        return None
+    fitted, given = trial.parameters["length"], held[name].parameters["length"].value
+    if fitted.stderr is None or abs(fitted.value - given) <= 4 * fitted.stderr:
+        return None
+    warning = (
+        f"the length given, {given:.4g} m, contradicts the period: the record asks for {fitted.value:.5g} m "
+        f"± {fitted.stderr:.1g} m; the length was fitted. Measure from the pivot to the bob's centre."
+    )
+    again: dict[str, FitResult] = {}
+    for other in fits:
+        start = (
+            {**_start_from(again), **(options.get("start") or {})} if other.startswith("full") else options.get("start")
+        )
+        result = fit(series, scene, other, **{**loose, "start": start})
+        again[other] = replace(result, warnings=(*result.warnings, warning))
+    return again
+
+
+def _compared(fits: dict[str, FitResult]) -> dict[str, FitResult]:
+    """χ², AIC and BIC of all on one footing: the noise of the best model."""
+    good = [r for r in fits.values() if r.success and math.isfinite(r.chi2) and r.dof > 0]
+    if not good:
+        return fits
+    best = min(good, key=lambda r: r.noise["rss"] if r.noise["source"] == "residuals" else r.chi2)
+    inflation2 = float(best.noise["inflation"]) ** 2
+    compared = {}
+    for name, result in fits.items():
+        chi2 = result.chi2
+        if best.noise["source"] == "residuals":
+            chi2 = result.noise["rss"] / best.noise["sigma_rad"] ** 2
+        count = len(result.free)
+        effective = max(
+            result.residuals_rad.size * float(best.noise["effective_points"]) / best.residuals_rad.size, 2.0
+        )
+        compared[name] = replace(
+            result,
+            chi2=chi2,
+            aic=chi2 / inflation2 + 2 * count,
+            bic=chi2 / inflation2 + count * math.log(effective),
+            noise={**result.noise, "comparison_inflation": math.sqrt(inflation2)},
+        )
+    return compared
+
+
+__all__ = ["FitResult", "FittedParameter", "PendulabError", "choose_model", "fit", "fit_models"]

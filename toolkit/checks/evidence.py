@@ -1,0 +1,97 @@
+"""What a check looks at: the record, the fits, the scene, and a way to fit one more model on the same footing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from toolkit.fit import FitResult, fit
+from toolkit.scene import Scene
+from toolkit.series import ThetaSeries
+
+FAILS_BELOW_P = 5e-4
+"""A verdict `fails` needs a chance below this that the simpler model is right after all."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """One record and all that is known of it. `extra` caches fits that checks asked for."""
+
+    series: ThetaSeries
+    fits: Mapping[str, FitResult]
+    scene: Scene
+    preferred: str
+    extra: dict[str, FitResult] = field(default_factory=dict)
+
+    @property
+    def best(self) -> FitResult:
+        """The full-sine fit with the lowest χ² (the preferred one where none has the full sine)."""
+        full = [r for r in self.fits.values() if r.success and r.model.startswith("full")]
+        return min(full, key=lambda r: r.chi2) if full else self.fits[self.preferred]
+
+    @property
+    def inflation2(self) -> float:
+        """Factor by which χ² differences overstate what is known: noise power at the pendulum's frequency over σ²."""
+        return float(self.best.noise.get("inflation", 1.0)) ** 2
+
+    @property
+    def sigma_rad(self) -> np.ndarray:
+        """(n,) σ of the points: the series' own, or the scatter about the best model."""
+        if self.series.sigma_theta_rad is not None:
+            return self.series.sigma_theta_rad
+        return np.full(len(self.series), float(self.best.noise["sigma_rad"]))
+
+    def fit(self, model: str) -> FitResult:
+        """The fit of that model: as given, or made now with the same parameters free."""
+        if model in self.fits:
+            return self.fits[model]
+        if model not in self.extra:
+            like = self.best
+            length = like.parameters.get("length")
+            free = ("length",) if length is not None and not length.fixed else ()
+            start = (
+                {n: p.value for n, p in like.parameters.items() if not p.fixed} if model.startswith("full") else None
+            )
+            self.extra[model] = fit(self.series, self.scene, model, free=free, start=start)
+        return self.extra[model]
+
+    def chi2(self, result: FitResult) -> float:
+        """χ² with this evidence's σ, divided by `inflation2`: differences of it are honest."""
+        return float(np.sum((result.residuals_rad / self.sigma_rad) ** 2)) / self.inflation2
+
+    def amplitude(self, t_s: np.ndarray | None = None) -> np.ndarray:
+        """(n,) amplitude of the swing against time from the best fit, in rad: what its energy at t reaches."""
+        omega_g = omega_g_of(self.best)
+        offset = self.best.parameters["theta_offset"].value if "theta_offset" in self.best.parameters else 0.0
+        theta, omega = self.best.theta_rad - offset, self.best.omega_rad_per_s
+        height = np.sin(theta / 2) ** 2 + (omega / (2 * omega_g)) ** 2
+        amplitude = 2 * np.arcsin(np.sqrt(np.clip(height, 0, 1)))
+        return amplitude if t_s is None else np.interp(t_s, self.series.t_s, amplitude)
+
+
+def omega_g_of(result: FitResult) -> float:
+    """ω_g of a fit, whichever way it is parametrised."""
+    for table in (result.parameters, result.derived):
+        if "omega_g" in table:
+            return table["omega_g"].value
+    return 2 * math.pi / result.derived["T0"].value
+
+
+def boundary_p(delta_chi2: float, added: int) -> float:
+    """p-value of a χ² gain by `added` (1 or 2) parameters that cannot be negative: the 50:50 (1:2:1) mixture."""
+    from scipy.stats import chi2
+
+    gain = max(delta_chi2, 0.0)
+    if added == 1:
+        return float(0.5 * chi2.sf(gain, 1))
+    return float(0.5 * chi2.sf(gain, 1) + 0.25 * chi2.sf(gain, 2))
+
+
+def sigmas(p_value: float) -> float:
+    """A one-sided p-value as a number of standard deviations."""
+    from scipy.stats import norm
+
+    return float(min(norm.isf(max(p_value, 1e-300)), 37.0)) if p_value < 1 else 0.0

@@ -1,0 +1,234 @@
+"""What a model is: an equation of motion, the coefficients it leaves free, and θ(t) with its derivatives.
+
+Models work on the reduced equation, in which neither mass nor length is needed (mass = length = 1, g = ω_g²):
+
+    θ'' = −ω_g² sin θ − 2 α_d θ' − β |θ'| θ' − μ sgn θ' + a cos(2π f t + ψ)
+
+with α_d = k_d/(2m), β = c ℓ/m, μ = τ/(m ℓ²), a = f0/(m ℓ). A model whose effects are not in this list (buoyancy,
+sphere_drag …) is solved in the scene's own units instead, so it needs the scene's mass, length and bob radius.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from toolkit.scene import Scene
+
+REDUCED = {
+    "linear_drag": ("alpha_d",),
+    "quadratic_drag": ("beta",),
+    "pivot_friction": ("mu",),
+    "cosine_drive": ("drive", "f", "drive_phase"),
+}
+"""The effects of the reduced equation and the coefficients that each brings."""
+
+_EQUATION_NAME = {
+    "alpha_d": "linear_drag.k_d_kg_per_s",
+    "beta": "quadratic_drag.c_kg_per_m",
+    "mu": "pivot_friction.torque_n_m",
+    "drive": "cosine_drive.f0_n",
+    "f": "cosine_drive.f_hz",
+    "drive_phase": "cosine_drive.phase_rad",
+}
+_ACCURACY_RAD = 1e-9
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A model's motion at n times: θ (n,) in rad, θ̇ (n,) in rad/s, and both derived by each coefficient asked for.
+
+    d_theta, d_omega : (n, k), one column a name in the order asked for.
+    """
+
+    theta: np.ndarray
+    omega: np.ndarray
+    d_theta: np.ndarray
+    d_omega: np.ndarray
+    method: str = ""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A pendulum model.
+
+    name : as in fit.json.    summary : a few words for tables.    effects : of `toolkit.effects`; they make the equation.
+    small_angle : θ in place of sin θ.    closed_form : the paper's analytic solution (needs linear_drag, small_angle).
+    fixed : effect parameters and pendulum constants that are not fitted, for the equation in the scene's own units
+    (empty for the reduced equation).
+    """
+
+    name: str
+    summary: str
+    effects: tuple[str, ...]
+    small_angle: bool = False
+    closed_form: bool = False
+    fixed: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of the reduced coefficients that the effects bring (ω_g, θ₀ and φ are always there too)."""
+        return tuple(name for effect in self.effects for name in REDUCED.get(effect, ()))
+
+    @property
+    def drags(self) -> tuple[str, ...]:
+        """Those coefficients that take energy out, each ≥ 0 in nature."""
+        return tuple(name for name in self.coefficients if name in ("alpha_d", "beta", "mu"))
+
+    @property
+    def needs_scene(self) -> bool:
+        """True where mass and length cannot be divided out of the equation."""
+        return any(effect not in REDUCED for effect in self.effects)
+
+    @property
+    def latex(self) -> str:
+        """The equation of motion that is solved."""
+        return str(self._equation().latex)
+
+    def within(self, scene: Scene) -> Model:
+        """This model in a scene: driven where the scene is, in the scene's own units where the equation needs them.
+
+        Raises UsageError where the scene lacks a number that the equation needs.
+        """
+        effects = self.effects
+        if "cosine_drive" in scene.effects and "cosine_drive" not in effects:
+            effects = (*effects, "cosine_drive")
+        model = replace(self, effects=effects)
+        return replace(model, fixed=model._constants(scene)) if model.needs_scene else model
+
+    def _constants(self, scene: Scene) -> dict[str, float]:
+        from toolkit.effects import check_parameters
+
+        pendulum, air = scene.pendulum, scene.environment
+        if pendulum.mass_kg is None or pendulum.length_m is None:
+            raise UsageError(f"model {self.name!r} needs the pendulum's mass and length: give --mass-kg and --length-m")
+        constants = {
+            "mass_kg": pendulum.mass_kg,
+            "length_m": pendulum.length_m,
+            "fluid_density_kg_per_m3": air.fluid_density_kg_per_m3,
+            "fluid_viscosity_pa_s": air.fluid_viscosity_pa_s,
+        }
+        if pendulum.bob_radius_m is not None:
+            constants["bob_radius_m"] = pendulum.bob_radius_m
+        for effect in self.effects:
+            if effect not in REDUCED:
+                table = check_parameters(effect, scene.effects.get(effect, {}))
+                constants |= {
+                    f"{effect}.{key}": value for key, value in table.items() if isinstance(value, int | float)
+                }
+        missing = [name for name in self._equation().parameters if name not in constants and "." not in name]
+        if "bob_radius_m" in missing:
+            raise UsageError(f"model {self.name!r} needs the bob's radius: give --bob-radius-m")
+        return constants
+
+    def motion(self, values: Mapping[str, float], t_s: np.ndarray, by: Sequence[str] = ()) -> Motion:
+        """θ(t), θ̇(t) at `t_s` (increasing, ≥ 0) and their derivatives by the coefficients named in `by`.
+
+        `values` holds theta0, phi, omega_g and `coefficients`. The start follows CONVENTIONS.md: with κ = sin(θ₀/2),
+        sin(θ(0)/2) = κ sin φ and θ̇(0) = 2 κ ω_g cos φ; for small angles θ(0) = θ₀ sin φ, θ̇(0) = θ₀ ω_g cos φ.
+        """
+        if self.closed_form:
+            return self._closed_form(values, t_s, by)
+        mass, length = self.fixed.get("mass_kg", 1.0), self.fixed.get("length_m", 1.0)
+        omega_g = values["omega_g"]
+        scale = {
+            "alpha_d": 2 * mass,
+            "beta": mass / length,
+            "mu": mass * length**2,
+            "drive": mass * length,
+            "f": 1.0,
+            "drive_phase": 1.0,
+        }
+        parameters = {"mass_kg": 1.0, "length_m": 1.0, **self.fixed, "g_m_per_s2": omega_g**2 * length}
+        parameters |= {_EQUATION_NAME[name]: scale[name] * values[name] for name in self.coefficients}
+        theta_start, omega_start, start_by = self._start(values)
+        starts = [name for name in ("theta0", "phi", "omega_g") if name in by]
+        asked = [_EQUATION_NAME[name] for name in by if name in scale]
+        if "omega_g" in by:
+            asked.append("g_m_per_s2")
+        if starts:
+            asked += ["theta0_rad", "omega0_rad_per_s"]
+        solution = self._equation().solve(
+            parameters, theta_start, omega_start, t_s, accuracy_rad=_ACCURACY_RAD, sensitivities=tuple(asked)
+        )
+        column = {name: i for i, name in enumerate(asked)}
+        blocks = []
+        for block in (solution.d_theta, solution.d_omega) if asked else ():
+            out = np.empty((len(t_s), len(by)))
+            for i, name in enumerate(by):
+                if name in scale:
+                    out[:, i] = scale[name] * block[:, column[_EQUATION_NAME[name]]]
+                    continue
+                by_theta, by_omega = start_by[name]
+                out[:, i] = by_theta * block[:, column["theta0_rad"]] + by_omega * block[:, column["omega0_rad_per_s"]]
+                if name == "omega_g":
+                    out[:, i] += 2 * omega_g * length * block[:, column["g_m_per_s2"]]
+            blocks.append(out)
+        d_theta, d_omega = blocks or (np.empty((len(t_s), 0)), np.empty((len(t_s), 0)))
+        return Motion(solution.theta_rad, solution.omega_rad_per_s, d_theta, d_omega, solution.method)
+
+    def _start(self, values: Mapping[str, float]) -> tuple[float, float, dict[str, tuple[float, float]]]:
+        """θ(0), θ̇(0), and for each start coefficient the derivatives of both."""
+        theta0, phi, omega_g = values["theta0"], values["phi"], values["omega_g"]
+        sine, cosine = math.sin(phi), math.cos(phi)
+        if self.small_angle:
+            return (
+                theta0 * sine,
+                theta0 * omega_g * cosine,
+                {
+                    "theta0": (sine, omega_g * cosine),
+                    "phi": (theta0 * cosine, -theta0 * omega_g * sine),
+                    "omega_g": (0.0, theta0 * cosine),
+                },
+            )
+        kappa, d_kappa = math.sin(theta0 / 2), math.cos(theta0 / 2) / 2
+        root = math.sqrt(max(1 - (kappa * sine) ** 2, 1e-300))
+        return (
+            2 * math.asin(kappa * sine),
+            2 * kappa * omega_g * cosine,
+            {
+                "theta0": (2 * d_kappa * sine / root, 2 * d_kappa * omega_g * cosine),
+                "phi": (2 * kappa * cosine / root, -2 * kappa * omega_g * sine),
+                "omega_g": (0.0, 2 * kappa * cosine),
+            },
+        )
+
+    def _equation(self) -> Any:
+        return _equation(self.effects, self.small_angle)
+
+    def _closed_form(self, values: Mapping[str, float], t_s: np.ndarray, by: Sequence[str]) -> Motion:
+        from toolkit.motion.closed_form import paper_model
+
+        names = {
+            "theta0": ("theta0_rad", 1.0),
+            "phi": ("phi_rad", 1.0),
+            "alpha_d": ("alpha_d_per_s", 1.0),
+            "omega_g": ("omega_g_rad_per_s", 1.0),
+            "drive": ("drive_rad_per_s2", 1.0),
+            "f": ("omega_f_rad_per_s", 2 * math.pi),
+            "drive_phase": ("phase_rad", 1.0),
+        }
+        solved = paper_model(
+            t_s,
+            **{names[name][0]: names[name][1] * value for name, value in values.items() if name in names},
+            derivatives=[names[name][0] for name in by],
+        )
+        scale = np.array([names[name][1] for name in by])
+        return Motion(
+            solved.theta_rad, solved.omega_rad_per_s, solved.d_theta * scale, solved.d_omega * scale, "closed form"
+        )
+
+
+@functools.lru_cache(maxsize=32)
+def _equation(effects: tuple[str, ...], small_angle: bool) -> Any:
+    from toolkit.motion import build_equation
+
+    return build_equation(effects, small_angle=small_angle)

@@ -1,0 +1,188 @@
+"""What the residuals of a fit say about the noise, and what that does to the error bars.
+
+White noise needs nothing. Correlated residuals leave the fitted values nearly unbiased but make the usual errors too
+small, by √(S(ω)/σ²) with S the noise spectrum at the pendulum's own frequency. The residuals are described by an
+autoregression; the covariance of the parameters is then A⁻¹ (Jᵀ R J) A⁻¹ with R the correlation that it implies,
+which gives each parameter the noise of the frequencies that it listens to.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+_LARGEST_ORDER = 8
+_WHITE_P = 1e-3
+_LAGS = 20
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of one fit.
+
+    sigma_rad : rms scatter of a point.    source : "series" (σ given) or "residuals" (σ estimated).
+    scale : residual scatter over the σ that weighted the fit (1 where σ came from the residuals).
+    scale_used : the factor on error bars: 1 where the given σ agrees with the scatter.
+    rho1 : residual autocorrelation at one step.    durbin_watson, ljung_box_p, runs_z : tests of whiteness.
+    white : True where they find nothing.    coefficients : of the autoregression that describes the residuals.
+    inflation : √(S(ω)/σ²) at the pendulum's frequency: error bars over those for white noise of the σ used.
+    effective_points : n / inflation².
+    """
+
+    sigma_rad: float
+    source: str
+    scale: float
+    scale_used: float
+    rho1: float
+    durbin_watson: float
+    ljung_box_p: float
+    runs_z: float
+    white: bool
+    coefficients: tuple[float, ...]
+    inflation: float
+    effective_points: float
+
+    def as_dict(self) -> dict[str, float | str | bool | list[float]]:
+        """Plain numbers for FitResult.noise and fit.json."""
+        return {
+            "sigma_rad": self.sigma_rad,
+            "source": self.source,
+            "scale": self.scale,
+            "scale_used": self.scale_used,
+            "rho1": self.rho1,
+            "durbin_watson": self.durbin_watson,
+            "ljung_box_p": self.ljung_box_p,
+            "runs_z": self.runs_z,
+            "white": self.white,
+            "autoregression": list(self.coefficients),
+            "inflation": self.inflation,
+            "effective_points": self.effective_points,
+        }
+
+
+def measure_noise(
+    normalised: np.ndarray, sigma_rad: np.ndarray | float, known: bool, omega: float, step_s: float, free: int
+) -> Noise:
+    """The noise from residuals divided by the σ used (`normalised`, (n,)).
+
+    known : whether σ came with the series.    omega : the pendulum's, rad/s.    step_s : typical time between points.
+    free : number of fitted parameters.
+    """
+    n = normalised.size
+    dof = max(n - free, 1)
+    scale = math.sqrt(float(normalised @ normalised) / dof)
+    sigma = float(np.sqrt(np.mean(np.square(sigma_rad)))) * scale
+    if n < 8 or not scale > 0 or not math.isfinite(scale):
+        return Noise(sigma, "series" if known else "residuals", scale, 1.0, 0.0, 2.0, 1.0, 0.0, True, (), 1.0, float(n))
+    r = normalised / scale
+    rho = autocorrelation(r, min(_LAGS, n // 4))
+    durbin = float(np.sum(np.diff(r) ** 2) / (r @ r))
+    p = ljung_box(rho, n)
+    agrees = abs(scale**2 - 1) < 4 * math.sqrt(2 / dof)
+    used = 1.0 if known and agrees else scale
+    white = p > _WHITE_P
+    coefficients = () if white else autoregression(r)
+    inflation = used * math.sqrt(spectrum(coefficients, omega * step_s))
+    return Noise(
+        sigma_rad=sigma,
+        source="series" if known else "residuals",
+        scale=scale,
+        scale_used=used,
+        rho1=float(rho[0]) if rho.size else 0.0,
+        durbin_watson=durbin,
+        ljung_box_p=p,
+        runs_z=runs_z(r),
+        white=white,
+        coefficients=tuple(float(c) for c in coefficients),
+        inflation=inflation,
+        effective_points=n / max(inflation / used, 1e-3) ** 2,
+    )
+
+
+def autocorrelation(x: np.ndarray, lags: int) -> np.ndarray:
+    """Autocorrelation of x at lags 1 … `lags` (biased estimate, mean not removed: residuals have none)."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    size = next_fast_len(2 * x.size)
+    full = irfft(np.abs(rfft(x, size)) ** 2, size)[: lags + 1]
+    return np.asarray(full[1:] / full[0])
+
+
+def ljung_box(rho: np.ndarray, n: int) -> float:
+    """p-value of Ljung and Box's Q = n(n+2) Σ ρ_k²/(n−k) against χ² with one degree of freedom a lag."""
+    from scipy.stats import chi2
+
+    lag = np.arange(1, rho.size + 1)
+    return float(chi2.sf(n * (n + 2) * np.sum(rho**2 / (n - lag)), rho.size))
+
+
+def runs_z(x: np.ndarray) -> float:
+    """Wald and Wolfowitz's runs test of the signs, as a number of standard deviations (negative: too few runs)."""
+    above = x > 0
+    up, down = int(above.sum()), int((~above).sum())
+    n = up + down
+    if up == 0 or down == 0:
+        return -math.sqrt(n)
+    runs = 1 + int(np.count_nonzero(above[1:] != above[:-1]))
+    both = 2.0 * up * down
+    return (runs - 1 - both / n) / math.sqrt(both * (both - n) / (n**2 * (n - 1.0)))
+
+
+def autoregression(x: np.ndarray) -> np.ndarray:
+    """Coefficients a of x_i = Σ a_k x_{i−k} + white noise; Yule–Walker, the order by BIC up to eight."""
+    from scipy.linalg import solve_toeplitz
+
+    n = x.size
+    rho = np.concatenate([[1.0], autocorrelation(x, min(_LARGEST_ORDER, n // 4))])
+    best, best_bic = np.empty(0), 0.0
+    for order in range(1, rho.size):
+        a = solve_toeplitz(rho[:order], rho[1 : order + 1])
+        left = 1 - float(a @ rho[1 : order + 1])
+        if not left > 0:
+            break
+        bic = n * math.log(left) + order * math.log(n)
+        if bic < best_bic:
+            best, best_bic = a, bic
+    return best
+
+
+def spectrum(coefficients: tuple[float, ...] | np.ndarray, phase: float) -> float:
+    """Power of the autoregression at `phase` = ω Δt, relative to white noise of the same variance."""
+    if len(coefficients) == 0:
+        return 1.0
+    a = np.asarray(coefficients)
+    k = np.arange(1, a.size + 1)
+    return float(_innovation(a) / abs(1 - np.sum(a * np.exp(-1j * k * phase))) ** 2)
+
+
+def _innovation(a: np.ndarray) -> float:
+    """Variance of the white noise that drives an autoregression of unit variance."""
+    return 1 / float(np.sum(_response(a) ** 2))
+
+
+def _response(a: np.ndarray, longest: int = 1 << 15) -> np.ndarray:
+    """Response of the autoregression to one unit of noise, until it has died away."""
+    from scipy.signal import lfilter
+
+    size = 64
+    while True:
+        pulse = np.zeros(size)
+        pulse[0] = 1.0
+        response = np.asarray(lfilter([1.0], np.concatenate([[1.0], -a]), pulse))
+        if size >= longest or np.max(np.abs(response[-size // 4 :])) < 1e-7:
+            return response
+        size *= 2
+
+
+def spread(jacobian: np.ndarray, noise: Noise) -> np.ndarray:
+    """Jᵀ R J (k, k) for residuals with that noise: J is (n, k), already divided by σ."""
+    if len(noise.coefficients) == 0:
+        return np.asarray(noise.scale_used**2 * (jacobian.T @ jacobian))
+    from scipy.signal import fftconvolve
+
+    response = _response(np.asarray(noise.coefficients))
+    response = response / math.sqrt(float(np.sum(response**2)))
+    coloured = fftconvolve(jacobian[::-1], response[:, None], axes=0)
+    return np.asarray(noise.scale_used**2 * (coloured.T @ coloured))

@@ -1,0 +1,576 @@
+"""A fit, posed: which numbers are free, what is known of the others, residuals and Jacobian; and its solution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.errors import UsageError
+from toolkit.fit import FitResult, FittedParameter
+from toolkit.guess import Guess, guess, guess_from_integrals, point_noise
+from toolkit.models import load_model
+from toolkit.models.model import Model, Motion
+from toolkit.noise import measure_noise, spread
+from toolkit.registry import did_you_mean
+
+if TYPE_CHECKING:
+    from toolkit.scene import Scene
+    from toolkit.series import ThetaSeries
+
+UNITS = {
+    "k_d": "kg/s",
+    "alpha_d": "1/s",
+    "c": "kg/m",
+    "beta": "1",
+    "torque": "N m",
+    "mu": "1/s^2",
+    "theta0": "rad",
+    "phi": "rad",
+    "omega_g": "rad/s",
+    "length": "m",
+    "theta_offset": "rad",
+    "f0": "N",
+    "f": "Hz",
+    "drive_phase": "rad",
+    "angle_scale": "1",
+    "time_scale": "1",
+}
+_DRAG_NAMES = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
+_LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
+_BAD = 1e10
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One model on one series.
+
+    values : name -> value held or to start from.    free : names fitted, in order.    priors : name -> (mean, u) of
+    nuisance and other parameters measured beforehand; each adds one residual.    sigma : (n,) weights' σ.
+    """
+
+    series: ThetaSeries
+    scene: Scene
+    model: Model
+    free: tuple[str, ...]
+    values: Mapping[str, float]
+    priors: Mapping[str, tuple[float, float]]
+    sigma: np.ndarray
+    sigma_known: bool
+    loss: str = "linear"
+    time_sigma_s: float = 0.0
+    shift_s: float = 0.0
+
+    @property
+    def t_s(self) -> np.ndarray:
+        """Times of the points with the start at t = 0 (the series' own, unless it starts late or before zero)."""
+        return self.series.t_s - self.shift_s
+
+    # -- from the names of the report to those of the reduced equation ------------------------------------------
+
+    def reduce(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+        """Reduced coefficients, and name -> {coefficient: derivative} for each reported name."""
+        mass, gravity = self.scene.pendulum.mass_kg, self.scene.environment.gravity_m_per_s2
+        reduced = {"theta0": values["theta0"], "phi": values["phi"]}
+        by: dict[str, dict[str, float]] = {"theta0": {"theta0": 1.0}, "phi": {"phi": 1.0}}
+        length = values.get("length")
+        if length is None:
+            reduced["omega_g"] = values["omega_g"]
+            by["omega_g"] = {"omega_g": 1.0}
+        else:
+            reduced["omega_g"] = math.sqrt(gravity / length) if length > 0 else math.nan
+            by["length"] = {"omega_g": -reduced["omega_g"] / (2 * length)}
+        m, el = mass or math.nan, length or math.nan
+        table = {  # reported name: coefficient, factor, power of the length in the factor
+            "alpha_d": ("alpha_d", 1.0, 0),
+            "k_d": ("alpha_d", 1 / (2 * m), 0),
+            "beta": ("beta", 1.0, 0),
+            "c": ("beta", el / m, 1),
+            "mu": ("mu", 1.0, 0),
+            "torque": ("mu", 1 / (m * el**2), -2),
+            "f0": ("drive", 1 / (m * el), -1),
+            "f": ("f", 1.0, 0),
+            "drive_phase": ("drive_phase", 1.0, 0),
+        }
+        for name, (coefficient, factor, power) in table.items():
+            if name in values:
+                reduced[coefficient] = factor * values[name]
+                by[name] = {coefficient: factor}
+                if power and "length" in by:
+                    by["length"][coefficient] = by["length"].get(coefficient, 0.0) + power * reduced[coefficient] / el
+        if "drive_phase" in reduced:
+            reduced["drive_phase"] += 2 * math.pi * reduced["f"] * self.shift_s
+        return reduced, by
+
+    def motion(self, values: Mapping[str, float], t_s: np.ndarray | None = None, names: Sequence[str] = ()) -> Motion:
+        """The model at t_s (default: the points) with derivatives of θ and θ̇ by the reported `names`."""
+        times = self.t_s if t_s is None else t_s
+        reduced, by = self.reduce(values)
+        needed = [c for c in dict.fromkeys(c for name in names for c in by.get(name, {}))]
+        stretched = times * (1 + values.get("time_scale", 0.0))
+        base = self.model.motion(reduced, stretched, needed)
+        d_theta, d_omega = np.zeros((2, times.size, len(names)))
+        for i, name in enumerate(names):
+            for coefficient, factor in by.get(name, {}).items():
+                column = needed.index(coefficient)
+                d_theta[:, i] += factor * base.d_theta[:, column]
+                d_omega[:, i] += factor * base.d_omega[:, column]
+            if name == "time_scale":
+                d_theta[:, i] = base.omega * times
+        return Motion(base.theta, base.omega, d_theta, d_omega, base.method)
+
+    def predict(self, values: Mapping[str, float], names: Sequence[str]) -> tuple[np.ndarray, np.ndarray, Motion]:
+        """What the camera should see, (n,), its derivatives (n, k) by `names`, and the motion itself."""
+        motion = self.motion(values, None, names)
+        scale = 1 + values.get("angle_scale", 0.0)
+        seen = scale * motion.theta + values.get("theta_offset", 0.0)
+        by = scale * motion.d_theta
+        for i, name in enumerate(names):
+            if name == "theta_offset":
+                by[:, i] = 1.0
+            elif name == "angle_scale":
+                by[:, i] = motion.theta
+        return seen, by, motion
+
+    # -- solving ------------------------------------------------------------------------------------------------
+
+    def solve(self, start: Mapping[str, float]) -> FitResult:
+        """The best fit from `start` (or the guess), with several starts only where the first fails."""
+        n, k = len(self.series), len(self.free) - len(self.priors)
+        if n <= k:
+            return self._failed(
+                f"{n} points cannot fix {k} parameters; record for longer or at a higher frame rate", None
+            )
+        attempts = []
+        for begin in self._starts(start):
+            found = self._descend(begin, self.free)
+            if found is None:
+                continue
+            attempts.append(found)
+            if self._good(found):
+                break
+        if not attempts:
+            return self._failed("the equation could not be solved from any start; check the times and angles", None)
+        best = min(attempts, key=lambda a: a.cost)
+        return self._report(self._bounded(best, {**best.values, **start}))
+
+    def _starts(self, start: Mapping[str, float]) -> Iterator[dict[str, float]]:
+        """First the guess (with what is given in its place), then others, each cheaper to compute than a fit."""
+        begin = {**self.values, **self._from_guess(self._guess())}
+        yield {**begin, **{k: v for k, v in start.items() if k in self.free}}
+        if start:
+            yield begin
+        yield from self._grown()
+
+    def _guess(self) -> Guess:
+        drive = self._drive()
+        if drive is not None and drive[0] != 0:
+            omega = self._known_omega()
+            span = None if omega is None else 3 * 2 * math.pi / omega
+            return guess_from_integrals(
+                self.t_s, self.series.theta_rad, small_angle=self.model.small_angle, drive=drive, span_s=span
+            )
+        return guess(self.t_s, self.series.theta_rad, self.model.drags, self.model.small_angle)
+
+    def _drive(self) -> tuple[float, float, float] | None:
+        if "cosine_drive" not in self.model.effects:
+            return None
+        reduced, _ = self.reduce({**self.values, "theta0": 0.1, "phi": 0.0, "omega_g": self.values.get("omega_g", 1.0)})
+        return reduced["drive"], reduced["f"], reduced["drive_phase"]
+
+    def _known_omega(self) -> float | None:
+        length = self.values.get("length")
+        return None if length is None else math.sqrt(self.scene.environment.gravity_m_per_s2 / length)
+
+    def _from_guess(self, first: Guess) -> dict[str, float]:
+        """The guess under the reported names, for those that are free."""
+        omega = first.omega_g
+        theta0, phi = first.theta0, first.phi
+        if self.model.closed_form:  # the paper's phase: θ̇(0) = θ₀(|ω_u| cos φ − α sin φ)
+            at_zero, slope = theta0 * math.sin(phi), theta0 * omega * math.cos(phi)
+            rate = math.sqrt(abs(omega**2 - first.alpha_d**2)) or omega
+            slope = (slope + first.alpha_d * at_zero) / rate
+            if first.alpha_d > 0.3 * omega:
+                theta0, phi = math.hypot(at_zero, slope), math.atan2(at_zero, slope)
+        length = self.values.get("length")
+        if length is not None:
+            length = self.scene.environment.gravity_m_per_s2 / omega**2 if "length" in self.free else length
+        m, el = self.scene.pendulum.mass_kg or math.nan, length or math.nan
+        table = {
+            "theta0": theta0,
+            "phi": phi,
+            "omega_g": omega,
+            "length": el,
+            "theta_offset": first.theta_offset,
+            "alpha_d": first.alpha_d,
+            "k_d": 2 * m * first.alpha_d,
+            "beta": first.beta,
+            "c": first.beta * m / el,
+            "mu": first.mu,
+            "torque": first.mu * m * el**2,
+        }
+        return {name: value for name, value in table.items() if name in self.free}
+
+    def _grown(self) -> Iterator[dict[str, float]]:
+        """Fit the first periods, then twice as many, and so on: the phase is never lost on the way."""
+        t, theta = self.t_s, self.series.theta_rad
+        rough = guess(t, theta, self.model.drags, self.model.small_angle)
+        omega = self._known_omega() or rough.omega_g
+        span = 3 * 2 * math.pi / omega
+        drive = self._drive()
+        begin = {
+            **self.values,
+            **self._from_guess(
+                guess_from_integrals(t, theta, small_angle=self.model.small_angle, drive=drive, span_s=span)
+            ),
+        }
+        while span < t[-1] - t[0]:
+            stop = int(np.searchsorted(t, t[0] + span))
+            span *= 2
+            if stop < 3 * len(self.free):
+                continue
+            part = replace(
+                self,
+                series=replace(
+                    self.series,
+                    t_s=self.series.t_s[:stop],
+                    theta_rad=theta[:stop],
+                    sigma_theta_rad=None,
+                ),
+                sigma=self.sigma[:stop],
+            )
+            found = part._descend(begin, self.free)
+            if found is not None:
+                begin = found.values
+        yield begin
+
+    def _good(self, found: Solved) -> bool:
+        if not found.success:
+            return False
+        residual = self.series.theta_rad - found.seen
+        noise = max(point_noise(self.series.theta_rad), 1e-12)
+        rms = float(np.sqrt(np.mean(residual**2)))
+        return rms < 5 * noise or rms < 0.3 * float(np.std(self.series.theta_rad))
+
+    def _descend(self, begin: Mapping[str, float], free: tuple[str, ...]) -> Solved | None:
+        """lmfit's Levenberg–Marquardt from `begin`. None where the equation cannot be solved there."""
+        import lmfit
+
+        cache: dict[tuple[float, ...], tuple[np.ndarray, np.ndarray]] = {}
+        held = {name: value for name, value in begin.items() if name not in free}
+        weight = 1 / self.sigma
+        measured = self.series.theta_rad
+
+        def evaluate(parameters: Any) -> tuple[np.ndarray, np.ndarray]:
+            valued = parameters.valuesdict()
+            point = tuple(valued[name] for name in free)
+            if point not in cache:
+                cache.clear()
+                cache[point] = self._residuals({**held, **dict(zip(free, point))}, free, measured, weight)
+            return cache[point]
+
+        parameters = lmfit.Parameters()
+        for name in free:
+            if not math.isfinite(begin[name]):
+                return None
+            parameters.add(name, value=begin[name])
+        minimizer = lmfit.Minimizer(
+            lambda p: evaluate(p)[0], parameters, scale_covar=False, max_nfev=150, nan_policy="omit"
+        )
+        with np.errstate(all="ignore"):
+            try:
+                if self.loss == "linear":
+                    outcome = minimizer.minimize(
+                        method="leastsq", Dfun=lambda p: evaluate(p)[1], ftol=1e-10, xtol=1e-10, factor=1.0
+                    )
+                else:
+                    sizes = np.linalg.norm(evaluate(parameters)[1], axis=0)
+                    outcome = minimizer.minimize(
+                        method="least_squares",
+                        jac=lambda p: evaluate(p)[1],
+                        loss=self.loss,
+                        f_scale=self._loss_scale(),
+                        x_scale=1 / np.where(sizes > 0, sizes, 1.0),
+                    )
+            except (ValueError, TypeError, FloatingPointError, np.linalg.LinAlgError, ArithmeticError):
+                return None
+            values = {**held, **{name: float(outcome.params[name].value) for name in free}}
+            residual, _ = self._residuals(values, free, measured, weight)
+        if not np.all(np.isfinite(residual)) or residual[0] >= _BAD:
+            return None
+        seen = measured - residual[: measured.size] * self.sigma
+        return Solved(values, seen, float(residual @ residual), bool(outcome.success), outcome)
+
+    def _loss_scale(self) -> float:
+        if self.sigma_known:
+            return 1.345
+        return 1.345 * max(point_noise(self.series.theta_rad), 1e-12) / float(np.median(self.sigma))
+
+    def _residuals(
+        self, values: Mapping[str, float], free: tuple[str, ...], measured: np.ndarray, weight: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(n + priors,) residuals over σ and their derivatives (n + priors, k); huge where the model has no value."""
+        rows = len(self.priors)
+        try:
+            seen, by, _ = self.predict(values, free)
+            whole = bool(np.all(np.isfinite(seen)) and np.all(np.isfinite(by)))
+        except (UsageError, ValueError, ArithmeticError, RuntimeError):
+            whole = False
+        if not whole:
+            return np.full(measured.size + rows, _BAD), np.zeros((measured.size + rows, len(free)))
+        residual = np.empty(measured.size + rows)
+        jacobian = np.zeros((measured.size + rows, len(free)))
+        residual[: measured.size] = (measured - seen) * weight
+        jacobian[: measured.size] = -by * weight[:, None]
+        for i, (name, (mean, u)) in enumerate(self.priors.items(), start=measured.size):
+            residual[i] = (values[name] - mean) / u
+            if name in free:
+                jacobian[i, free.index(name)] = 1 / u
+        return residual, jacobian
+
+    def _bounded(self, found: Solved, begin: Mapping[str, float]) -> Solved:
+        """The same with every drag ≥ 0: those that came out negative are held at zero and the others fitted again."""
+        zero: tuple[str, ...] = ()
+        while True:
+            negative = [n for n in self.free if n in _DRAG_NAMES and n not in zero and found.values[n] < 0]
+            if not negative:
+                return replace(found, at_zero=zero)
+            zero = (*zero, *negative)
+            free = tuple(name for name in self.free if name not in zero)
+            nothing = dict.fromkeys(zero, 0.0)
+            tries = (self._descend({**values, **nothing}, free) for values in (found.values, begin))
+            again = [t for t in tries if t is not None]
+            if not again:
+                return replace(found, values={**found.values, **nothing}, success=False, at_zero=zero)
+            found = min(again, key=lambda a: a.cost)
+
+    def _report(self, found: Solved) -> FitResult:
+        from toolkit.derived import derive
+
+        values = _tidied(found.values)
+        seen, by, motion = self.predict(values, self.free)
+        residual = self.series.theta_rad - seen
+        n, k = residual.size, len(self.free) - len(self.priors)
+        sigma = self.sigma
+        if self.time_sigma_s > 0:
+            sigma = np.hypot(sigma, self.time_sigma_s * motion.omega)
+        rss = float(np.sum((residual / sigma) ** 2))
+        dof = n - k
+        if not self.sigma_known:
+            sigma = sigma * math.sqrt(rss / max(dof, 1)) if rss > 0 else sigma
+        normalised = residual / sigma
+        reduced, _ = self.reduce(values)
+        step = float(np.median(np.diff(self.t_s)))
+        noise = measure_noise(normalised, sigma, self.sigma_known, reduced["omega_g"], step, k)
+        jacobian = by / sigma[:, None]
+        covariance, singular = self._covariance(jacobian, noise)
+        warnings = []
+        parameters = {}
+        for name, value in values.items():
+            i = self.free.index(name) if name in self.free else None
+            u = None if i is None or not math.isfinite(covariance[i, i]) else math.sqrt(max(covariance[i, i], 0.0))
+            parameters[name] = FittedParameter(
+                value, u, UNITS[name], i is None, minimum=0.0 if name in _DRAG_NAMES else None
+            )
+        for name in found.at_zero:
+            warnings.append(f"{name} came out negative and is held at its bound 0: the record does not show this drag")
+        chi2 = float(normalised @ normalised)
+        inflation2 = noise.inflation**2
+        success, message = found.success, "the fit converged"
+        if singular:
+            success = False
+            message = (
+                f"the record cannot fix {', '.join(singular)}: the covariance is singular; "
+                "fit a simpler model or record for longer"
+            )
+        elif not found.success:
+            message = f"the fit did not settle ({found.lmfit.message.strip()}); give a start value or a shorter stretch"
+        elif not self._good(found) and not self.model.small_angle:
+            success = False
+            message = (
+                "the model does not follow the record from any start tried; look for frames that jump, a second motion, "
+                "or cut the record with --start and --stop"
+            )
+        result = FitResult(
+            model=self.model.name,
+            parameters=_ordered(parameters),
+            free=self.free,
+            covariance=covariance,
+            chi2=chi2,
+            dof=dof,
+            aic=chi2 / inflation2 + 2 * len(self.free),
+            bic=chi2 / inflation2 + len(self.free) * math.log(max(noise.effective_points, 2.0)),
+            residuals_rad=residual,
+            theta_rad=seen,
+            omega_rad_per_s=motion.omega,
+            success=success,
+            message=message,
+            noise={**noise.as_dict(), "rss": float(residual @ residual), "loss": self.loss, "start_s": self.shift_s},
+            equation_latex=self.model.latex,
+            method=motion.method,
+            warnings=tuple(warnings),
+            lmfit=found.lmfit,
+        )
+        return replace(result, derived=derive(result, self))
+
+    def _covariance(self, jacobian: np.ndarray, noise: Any) -> tuple[np.ndarray, list[str]]:
+        """(k, k) covariance that allows for the noise and the priors, and the names that the record cannot fix."""
+        size = np.linalg.norm(jacobian, axis=0)
+        prior = np.array([1 / self.priors[name][1] ** 2 if name in self.priors else 0.0 for name in self.free])
+        scale = 1 / np.sqrt(size**2 + prior)
+        blind = [name for name, s in zip(self.free, scale) if not math.isfinite(s)]
+        if blind:
+            return np.full((len(self.free), len(self.free)), np.nan), blind
+        scaled = jacobian * scale
+        normal = scaled.T @ scaled + np.diag(prior * scale**2)
+        eigenvalue, vector = np.linalg.eigh(normal)
+        singular = eigenvalue[0] < 1e-13 * eigenvalue[-1]
+        eigenvalue = np.maximum(eigenvalue, 1e-15 * eigenvalue[-1])
+        inverse = (vector / eigenvalue) @ vector.T
+        middle = spread(scaled, noise) + np.diag(prior * scale**2)
+        covariance = (inverse @ middle @ inverse) * np.outer(scale, scale)
+        covariance = (covariance + covariance.T) / 2
+        loose = [self.free[i] for i in np.flatnonzero(np.abs(vector[:, 0]) > 0.3)] if singular else []
+        return covariance, loose
+
+    def _failed(self, message: str, found: Any) -> FitResult:
+        n = len(self.series)
+        nothing = np.full(n, np.nan)
+        parameters = {
+            name: FittedParameter(float(value), None, UNITS[name], name not in self.free)
+            for name, value in self.values.items()
+        }
+        return FitResult(
+            model=self.model.name,
+            parameters=_ordered(parameters),
+            free=self.free,
+            covariance=np.full((len(self.free), len(self.free)), np.nan),
+            chi2=math.nan,
+            dof=n - len(self.free),
+            aic=math.inf,
+            bic=math.inf,
+            residuals_rad=nothing,
+            theta_rad=nothing,
+            omega_rad_per_s=nothing,
+            success=False,
+            message=message,
+            noise={"sigma_rad": math.nan, "source": "none", "rho1": 0.0, "inflation": 1.0, "rss": math.inf},
+            lmfit=found,
+        )
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Where one descent ended."""
+
+    values: dict[str, float]
+    seen: np.ndarray
+    cost: float
+    success: bool
+    lmfit: Any
+    at_zero: tuple[str, ...] = ()
+
+
+def pose(
+    series: ThetaSeries,
+    scene: Scene,
+    model: str,
+    free: Sequence[str] = (),
+    fixed: Mapping[str, float] | None = None,
+    priors: Mapping[str, float] | None = None,
+    loss: str = "linear",
+    time_sigma_s: float = 0.0,
+) -> Problem:
+    """What `fit` solves. See there for the arguments and errors."""
+    if loss not in _LOSSES:
+        raise UsageError(f"unknown loss {loss!r}{did_you_mean(loss, _LOSSES)}")
+    within = load_model(model).within(scene)
+    mass, length = scene.pendulum.mass_kg, scene.pendulum.length_m
+    both = mass is not None and length is not None
+    reported = {
+        "alpha_d": "k_d" if mass is not None else "alpha_d",
+        "beta": "c" if both else "beta",
+        "mu": "torque" if both else "mu",
+    }
+    names = [reported[name] for name in within.drags] + ["theta0", "phi"]
+    values: dict[str, float] = dict.fromkeys(names, 0.0)
+    fixed = dict(fixed or {})
+    if length is None:
+        names.append("omega_g")
+        values["omega_g"] = 0.0
+    else:
+        values["length"] = length
+    names.append("theta_offset")
+    values["theta_offset"] = 0.0
+    if "cosine_drive" in within.effects:
+        if not both:
+            raise UsageError("a driven scene needs the pendulum's mass and length: give --mass-kg and --length-m")
+        from toolkit.effects import check_parameters
+
+        drive = check_parameters("cosine_drive", scene.effects["cosine_drive"])
+        values |= {"f0": drive["f0_n"], "f": drive["f_hz"], "drive_phase": drive.get("phase_rad", 0.0)}
+    told = dict(priors or {})
+    if priors is None or "angle_scale" not in told:
+        relative = series.meta.get("angle_scale_relative_u")
+        if relative:
+            told["angle_scale"] = float(relative)
+    known: dict[str, tuple[float, float]] = {}
+    for name, u in told.items():
+        if not u > 0:
+            raise UsageError(f"the prior of {name} must be a positive standard uncertainty, got {u}")
+        if name in ("angle_scale", "time_scale"):
+            values[name] = 0.0
+        elif name not in values:
+            raise UsageError(f"no parameter {name!r} in {model}{did_you_mean(name, list(values))}")
+        known[name] = (values[name], u)
+        if name not in names:
+            names.append(name)
+    for name in free:
+        if name not in values:
+            if name == "length" and length is None:
+                raise UsageError("there is no length to free; without one omega_g is fitted: leave `length` out")
+            raise UsageError(f"no parameter {name!r} in {model}{did_you_mean(name, list(values))}")
+        if name not in names:
+            names.append(name)
+    for name, value in fixed.items():
+        if name not in values:
+            raise UsageError(f"no parameter {name!r} in {model}{did_you_mean(name, list(values))}")
+        values[name] = float(value)
+        names = [n for n in names if n != name]
+        known.pop(name, None)
+    first = float(series.t_s[0])
+    shift = first if first < 0 or first > series.duration_s else 0.0
+    sigma = series.sigma_theta_rad
+    return Problem(
+        series=series,
+        scene=scene,
+        model=within,
+        free=tuple(names),
+        values=values,
+        priors=known,
+        sigma=np.ones(len(series)) if sigma is None else np.asarray(sigma),
+        sigma_known=sigma is not None,
+        loss=loss,
+        time_sigma_s=time_sigma_s,
+        shift_s=shift,
+    )
+
+
+def _tidied(values: Mapping[str, float]) -> dict[str, float]:
+    """θ₀ ≥ 0 and −π < φ ≤ π: the same motion."""
+    tidy = dict(values)
+    if tidy["theta0"] < 0:
+        tidy["theta0"], tidy["phi"] = -tidy["theta0"], tidy["phi"] + math.pi
+    tidy["phi"] = math.remainder(tidy["phi"], 2 * math.pi)
+    return tidy
+
+
+_ORDER = ("k_d", "alpha_d", "c", "beta", "torque", "mu", "theta0", "phi", "omega_g", "length", "theta_offset")
+
+
+def _ordered(parameters: Mapping[str, FittedParameter]) -> dict[str, FittedParameter]:
+    first = [name for name in _ORDER if name in parameters]
+    return {name: parameters[name] for name in [*first, *(n for n in parameters if n not in first)]}
