@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from toolkit.camera import check_parameters, load_effect
-from toolkit.camera.shoot import Shoot, View
+from toolkit.camera.shoot import Patch, Shoot, View
 from toolkit.errors import UsageError
 from toolkit.output import whole_folder
 from toolkit.progress import Progress, silent
@@ -239,7 +239,14 @@ class Studio:
         t_s, x, y, radius, pivot_x, pivot_y = np.array(rows)[self._take].T
         theta = self._theta(t_s)
         self._views = [
-            View(float(captured[i]), *map(float, (x[j], y[j], radius[j], theta[j])), place=self._place(captured[i]))
+            View(
+                float(captured[i]),
+                float(x[j]),
+                float(y[j]),
+                float(radius[j]),
+                float(theta[j]),
+                self._place(captured[i]),
+            )
             for i, j in enumerate(np.searchsorted(self._take, np.arange(captured.size)))
         ]
         visible = np.array([self._visible(i) for i in range(captured.size)])
@@ -308,7 +315,7 @@ class Studio:
 
     def expose(self, number: int) -> np.ndarray:
         """(h, w, 3) float32: the light of exposure `number`, 0–255, without noise."""
-        from toolkit.camera.paint import Patch, cover_disc, lay, lay_line
+        from toolkit.camera.paint import cover_disc, lay, lay_line
 
         shoot, view = self.shoot, self._views[number]
         image = self._wall().copy()

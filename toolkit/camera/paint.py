@@ -7,11 +7,13 @@ centres such a disc keeps its centroid to better than 1e-4 px for an edge of 0.5
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from toolkit.camera.shoot import Patch
+from toolkit.camera.shoot import Colour, Patch
 
+Painter = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 _REACH = 4.5  # sigmas after which an edge has no light left
 
 
@@ -21,7 +23,7 @@ def edge_sigma(point_spread_px: float, extra_px: float = 0.0) -> float:
 
 
 def cover_disc(
-    centres: np.ndarray, shapes: np.ndarray, sigma_px: float, colours=None, margin_px: float = 0.0
+    centres: np.ndarray, shapes: np.ndarray, sigma_px: float, colours: Painter | None = None
 ) -> tuple[int, int, np.ndarray, np.ndarray | None]:
     """Mean coverage of a soft disc that stands at each of `centres` for an equal share of the exposure.
 
@@ -32,7 +34,7 @@ def cover_disc(
     from scipy.special import ndtr
 
     radii = 1 / np.sqrt(np.abs(np.linalg.det(shapes)))
-    reach = 1 / np.linalg.svd(shapes, compute_uv=False).min() + _REACH * sigma_px + 1 + margin_px
+    reach = 1 / np.linalg.svd(shapes, compute_uv=False).min() + _REACH * sigma_px + 1
     x0, y0 = np.floor(centres.min(axis=0) - reach).astype(int)
     x1, y1 = np.ceil(centres.max(axis=0) + reach).astype(int)
     x, y = np.arange(x0, x1 + 1, dtype=float), np.arange(y0, y1 + 1, dtype=float)[:, None]
@@ -44,7 +46,7 @@ def cover_disc(
         inner = math.sqrt(max(radius**2 - sigma_px**2, (0.2 * radius) ** 2))
         share = ndtr((inner - radius * np.hypot(u, v)) / sigma_px)
         alpha += share
-        if light is not None:
+        if light is not None and colours is not None:
             light += share[:, :, None] * colours(u, v, k)
     alpha /= len(centres)
     if light is not None:
@@ -52,7 +54,9 @@ def cover_disc(
     return int(x0), int(y0), alpha, light
 
 
-def soft_disc(x_px: float, y_px: float, radius_px: float, sigma_px: float, rgb, strength: float = 1.0) -> Patch:
+def soft_disc(
+    x_px: float, y_px: float, radius_px: float, sigma_px: float, rgb: np.ndarray | Colour, strength: float = 1.0
+) -> Patch:
     """A still soft disc as a patch."""
     shape = np.eye(2)[None] / radius_px
     x0, y0, alpha, _ = cover_disc(np.array([[x_px, y_px]]), shape, sigma_px)
@@ -60,7 +64,13 @@ def soft_disc(x_px: float, y_px: float, radius_px: float, sigma_px: float, rgb, 
 
 
 def soft_box(
-    x0_px: float, x1_px: float, y0_px: float, y1_px: float, sigma_px: float, rgb, strength: float = 1.0
+    x0_px: float,
+    x1_px: float,
+    y0_px: float,
+    y1_px: float,
+    sigma_px: float,
+    rgb: np.ndarray | Colour,
+    strength: float = 1.0,
 ) -> Patch:
     """A still soft upright rectangle as a patch."""
     from scipy.special import ndtr
