@@ -101,7 +101,9 @@ def _encoder(codec: dict[str, Any], suffix: str) -> tuple[str, dict[str, str], s
     if name == "h264":
         options["x264-params"] = "mbtree=0"  # with it, small pictures are not encoded the same way twice
     if name == "hevc":
-        options["x265-params"] = "log-level=none:pools=2:frame-threads=1"
+        options["x265-params"] = "log-level=none:pools=2:frame-threads=1" + (":bframes=0" if suffix == ".avi" else "")
+    if suffix == ".avi":
+        options["bf"] = "0"  # AVI has no stamps to put reordered frames right
     if not rated:
         options["crf"] = crf
     return _ENCODERS[name], options, "yuv420p"

@@ -17,11 +17,9 @@ def apply(shoot: Shoot, values: Mapping[str, Any], rng: np.random.Generator) -> 
     x, y = shoot.pivot_px
 
     def mount(image: np.ndarray) -> None:
-        for box in (
-            (x - size / 2, x + size / 2, y - size, y),
-            (x, shoot.width_px + 9.0, y - 0.7 * size, y - 0.4 * size),
-        ):
-            patch = soft_box(*box, 0.6, rgb)
+        clamp = soft_box(x - size / 2, x + size / 2, y - size, y, 0.6, rgb)
+        rod = soft_box(x, shoot.width_px + 9.0, y - 0.7 * size, y - 0.4 * size, 0.6, rgb)
+        for patch in (clamp, rod):
             lay(image, patch, np.asarray(rgb))
 
     if size > 0:
