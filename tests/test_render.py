@@ -44,6 +44,10 @@ def decode(path) -> tuple[list[np.ndarray], np.ndarray]:
 @pytest.mark.parametrize("codec", ["h264", "hevc", "mjpeg", "lossless"])
 def test_every_codec_in_every_container(tmp_path, suffix, codec):
     film = tmp_path / f"film{suffix}"
+    if (codec, suffix) == ("hevc", ".avi"):
+        with pytest.raises(UsageError, match=r"\.mkv"):
+            render(scene(codec={"name": codec}), film)
+        return
     truth = render(scene(codec={"name": codec}), film)
     frames, stamps = decode(film)
     assert len(frames) == truth.frame.size == 15

@@ -37,6 +37,8 @@ class Film:
         suffix = self.path.suffix.lower()
         if suffix not in _SUFFIXES:
             raise UsageError(f"cannot write a video as {suffix}; use {', '.join(_SUFFIXES)} or a folder's name")
+        if suffix == ".avi" and codec.get("name") == "hevc":
+            raise UsageError(".avi cannot hold HEVC; use .mp4, .mov or .mkv")
         name, options, pixels = _encoder(codec, suffix)
         if pixels == "yuv420p" and (width_px % 2 or height_px % 2):
             raise UsageError(
@@ -101,7 +103,7 @@ def _encoder(codec: dict[str, Any], suffix: str) -> tuple[str, dict[str, str], s
     if name == "h264":
         options["x264-params"] = "mbtree=0"  # with it, small pictures are not encoded the same way twice
     if name == "hevc":
-        options["x265-params"] = "log-level=none:pools=2:frame-threads=1" + (":bframes=0" if suffix == ".avi" else "")
+        options["x265-params"] = "log-level=none:pools=2:frame-threads=1"
     if suffix == ".avi":
         options["bf"] = "0"  # AVI has no stamps to put reordered frames right
     if not rated:
