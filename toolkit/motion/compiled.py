@@ -1,0 +1,92 @@
+"""Where generated source lives, and how it becomes machine code that the next process finds ready.
+
+The folder is PENDULAB_CACHE if that is set, else the user's cache folder, else (not writable) a temporary one. A file's
+name is a hash of its content, and it is put in place by one rename: any number of processes may share the folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+
+@cache
+def cache_folder() -> Path:
+    """The folder of generated code, made if need be."""
+    wanted = os.environ.get("PENDULAB_CACHE")
+    if wanted:
+        candidates = [Path(wanted)]
+    else:
+        import platformdirs
+
+        candidates = [Path(platformdirs.user_cache_dir("pendulab", appauthor=False)) / "equations"]
+    candidates.append(Path(tempfile.gettempdir()) / f"pendulab-{os.getuid() if hasattr(os, 'getuid') else 'user'}")
+    for folder in candidates:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return Path(tempfile.mkdtemp(prefix="pendulab-"))
+
+
+def key_of(*parts: object) -> str:
+    """A short name for what is compiled: the same parts give the same name."""
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:20]
+
+
+def place(name: str, source: str) -> Path:
+    """Write a generated module whole into the cache folder."""
+    path = cache_folder() / f"{name}.py"
+    handle, scratch = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(source)
+    os.replace(scratch, path)
+    return path
+
+
+def load(name: str) -> ModuleType | None:
+    """The generated module of that name, or None where there is none yet (or it cannot be read)."""
+    path = cache_folder() / f"{name}.py"
+    if not path.exists():
+        return None
+    spec = importlib.util.spec_from_file_location(f"pendulab_{name}", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # Numba's cache looks it up by name
+    try:
+        spec.loader.exec_module(module)
+    except (SyntaxError, OSError):
+        return None
+    return module
+
+
+def jet_address(module: ModuleType) -> int:
+    """The address of the module's jet(q, s, W, R, n) as machine code, compiled now or found on disk."""
+    import numba
+    from numba import types
+
+    pointer = types.CPointer(types.float64)
+    signature = types.void(pointer, pointer, pointer, pointer, types.int64)
+    module.compiled_jet = numba.cfunc(signature, cache=True, fastmath={"contract", "reassoc", "nsz"})(module.jet)  # type: ignore[attr-defined]
+    address: int = module.compiled_jet.address
+    return address
+
+
+def terms_address(module: ModuleType) -> int:
+    """The address of the module's terms(q, s, out) as machine code, compiled now or found on disk."""
+    import numba
+    from numba import types
+
+    pointer = types.CPointer(types.float64)
+    signature = types.void(pointer, pointer, pointer)
+    module.compiled_terms = numba.cfunc(signature, cache=True)(module.terms)  # type: ignore[attr-defined]
+    address: int = module.compiled_terms.address
+    return address

@@ -1,0 +1,405 @@
+"""The equation of motion of the active effects, and its solution by the route that suits it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from toolkit.effects import load_effect
+from toolkit.effects.effect import Effect, Term
+from toolkit.effects.formula import formula_needs, formula_parameters
+from toolkit.errors import JobError, UsageError
+from toolkit.motion.symbols import (
+    SCENE_SYMBOLS,
+    Latex,
+    Symbols,
+    latex_functions,
+    number_functions,
+    symbols,
+    sympy_functions,
+)
+from toolkit.registry import did_you_mean
+from toolkit.trajectory import Event, SolveCost
+
+START = ("theta0_rad", "omega0_rad_per_s")
+_VERSION = 1  # of the generated code: a change here makes old caches unused
+
+
+@dataclass(frozen=True)
+class Solution:
+    """θ and θ' at the times asked for; d_theta and d_omega (n, k) are their derivatives by the k sensitivities.
+
+    `error_estimate_rad` is the estimated largest error of θ over the whole run, all steps' errors carried along.
+    """
+
+    t_s: np.ndarray
+    theta_rad: np.ndarray
+    omega_rad_per_s: np.ndarray
+    d_theta: np.ndarray
+    d_omega: np.ndarray
+    method: str
+    cost: SolveCost
+    error_estimate_rad: float
+    events: tuple[Event, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One equation of motion, made of the active effects and of nothing else. Make it with `build_equation`."""
+
+    effects: tuple[Effect, ...]
+    small_angle: bool = False
+    formula_text: str = ""
+    _memory: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def parameters(self) -> tuple[str, ...]:
+        """Full names of all parameters: the scene's first, then "effect.parameter"."""
+        names = ["length_m", "g_m_per_s2"]
+        for effect in self.effects:
+            needs = (*effect.needs, *formula_needs(self.formula_text)) if effect.name == "formula" else effect.needs
+            names += [name for name in needs if name not in names]
+        for effect in self.effects:
+            own = (
+                formula_parameters(self.formula_text)
+                if effect.name == "formula"
+                else [p.name for p in effect.parameters]
+            )
+            names += [f"{effect.name}.{name}" for name in own]
+        return tuple(names)
+
+    @cached_property
+    def is_linear(self) -> bool:
+        """Linear in θ and θ' with constant coefficients and at most one cosine drive: there is a closed form."""
+        drives = sum(e.name == "cosine_drive" for e in self.effects)
+        return self.small_angle and all(e.linear for e in self.effects) and drives <= 1
+
+    @cached_property
+    def is_bare(self) -> bool:
+        """The pendulum alone, with nothing acting on it: the exact solution is known."""
+        return not self.small_angle and all(e.name == "slack_string" for e in self.effects)
+
+    @cached_property
+    def latex(self) -> str:
+        """The equation of motion as LaTeX, printed by the same terms that are compiled."""
+        names = dict(SCENE_SYMBOLS)
+        for effect in self.effects:
+            names |= {f"{effect.name}.{p.name}": p.symbol or rf"\mathrm{{{p.name}}}" for p in effect.parameters}
+        for name in self.parameters:
+            if name.startswith("formula."):
+                plain = name.removeprefix("formula.")
+                names[name] = plain if len(plain) == 1 else rf"\mathrm{{{plain}}}".replace("_", r"\_")
+        values = {name: Latex(text) for name, text in names.items()}
+        state = {"t": Latex("t"), "theta": Latex(r"\theta"), "omega": Latex(r"\dot\theta")}
+        torque, inertia, _, harmonics = self._sum(
+            symbols(latex_functions(), state, values, self.effects, self.small_angle, self.formula_text)
+        )
+        for h in harmonics:
+            torque = torque + h.amplitude * latex_functions()["cos"](
+                2 * Latex(r"\pi") * h.f_hz * Latex("t") + h.phase_rad
+            )
+        return rf"{inertia.at(2)}\,\ddot\theta = {torque.text}"
+
+    def terms_at(self, parameters: Mapping[str, float], t_s: Any, theta_rad: Any, omega_rad_per_s: Any) -> Motion:
+        """Torque, inertia, tension and energy at states, as numbers or arrays. Raises UsageError for a missing parameter."""
+        values = dict(zip(self.parameters, self._values(parameters)))
+        values.setdefault("mass_kg", parameters.get("mass_kg", 1.0))
+        state = {"t": t_s, "theta": theta_rad, "omega": omega_rad_per_s}
+        return self._motion(
+            symbols(number_functions(), state, values, self.effects, self.small_angle, self.formula_text)
+        )
+
+    def _motion(self, seen: dict[str, Symbols]) -> Motion:
+        s = seen[""]
+        torque, inertia, terms, harmonics = self._sum(seen)
+        for h in harmonics:
+            torque = torque + h.amplitude * s.cos(2 * s.pi * h.f_hz * s.t + h.phase_rad)
+        swing = s.mass_kg * s.length_m * s.omega**2
+        tension = swing + s.mass_kg * s.g_m_per_s2 * (1 - s.rise)
+        energy = inertia * s.omega**2 / 2 + s.mass_kg * s.g_m_per_s2 * s.length_m * s.rise
+        for term in terms:
+            tension, energy = tension + term.radial_force, energy + term.energy
+        return Motion(torque, inertia, tension, energy)
+
+    def flight(self, parameters: Mapping[str, float]) -> Flight:
+        """What moves the bob while the string is slack: gravity less buoyancy, drag, and the shaking of the frame."""
+        values = dict(zip(self.parameters, self._values(parameters)))
+        mass, g, length = (values[n] for n in ("mass_kg", "g_m_per_s2", "length_m"))
+        drags = [e for e in self.effects if e.name in ("linear_drag", "quadratic_drag", "sphere_drag", "added_mass")]
+        names = {e.name for e in self.effects}
+        moving = [e for e in self.effects if e.pivot is not None]
+        displaced = carried = 0.0
+        if names & {"buoyancy", "added_mass"}:
+            displaced = 4 / 3 * math.pi * values["bob_radius_m"] ** 3 * values["fluid_density_kg_per_m3"]
+        functions = number_functions()
+        state = {"t": 0.0, "theta": 0.0, "omega": 0.0}
+        if "added_mass" in names:
+            at_rest = symbols(functions, state, values, self.effects, False, self.formula_text)
+            carried = float(load_effect("added_mass").term(at_rest["added_mass"]).inertia) / length**2
+        inertia = mass + carried
+        weight = (mass - (displaced if "buoyancy" in names else 0.0)) / inertia
+        if not drags and not moving:
+            return Flight(g * weight, None)
+
+        def acceleration(t: float, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+            seen = symbols(functions, {**state, "t": t}, values, self.effects, False, self.formula_text)
+            pivot = seen[""].pivot
+            against = velocity + np.array(pivot.velocity) if pivot is not None else velocity
+            speed = float(np.hypot(*against))
+            drag = sum(float(e.term(seen[e.name].of({"speed": speed, "velocity": speed})).drag) for e in drags)
+            total = np.array([0.0, -g * weight]) - drag / inertia * against
+            return total - np.array(pivot.acceleration) if pivot is not None else total
+
+        return Flight(g * weight, acceleration)
+
+    def fastest_rad_per_s(self, parameters: Mapping[str, float]) -> float:
+        """The highest angular frequency with which time itself enters the equation, 0 where it does not."""
+        values = dict(parameters)
+        return max([2 * math.pi * values[n] for n in self.parameters if n.endswith(".f_hz")], default=0.0)
+
+    def _sum(self, seen: dict[str, Symbols]) -> tuple[Any, Any, list[Term], list[Any]]:
+        s = seen[""]
+        torque = -(s.mass_kg * s.g_m_per_s2 * s.length_m * s.sin_theta)
+        inertia = s.mass_kg * s.length_m**2
+        terms = [effect.term(seen[effect.name]) for effect in self.effects]
+        for term in terms:
+            torque, inertia = torque + term.torque - term.drag * (s.length_m * s.velocity), inertia + term.inertia
+        return torque, inertia, terms, [term.harmonic for term in terms if term.harmonic is not None]
+
+    def _values(self, parameters: Mapping[str, float]) -> tuple[float, ...]:
+        try:
+            return tuple([float(parameters[name]) for name in self.parameters])
+        except KeyError as error:
+            name = error.args[0]
+            raise UsageError(
+                f"the equation needs {name}; give it a value{did_you_mean(name, list(parameters))}"
+            ) from None
+
+    # -- the generated module ------------------------------------------------------------------------------------
+
+    @cached_property
+    def code(self) -> ModuleType:
+        """The generated module: from the disk if it was written before, else derived now."""
+        from toolkit.motion import compiled
+
+        def fingerprint(effect: Effect) -> tuple[str, str]:
+            import inspect
+
+            return effect.name, inspect.getsource(inspect.getmodule(effect.term))  # type: ignore[arg-type]
+
+        name = "equation_" + compiled.key_of(
+            _VERSION, [fingerprint(e) for e in self.effects], self.small_angle, self.formula_text
+        )
+        module = compiled.load(name)
+        if module is None:
+            compiled.place(name, self._derive())
+            module = compiled.load(name)
+        if module is None:
+            raise JobError(
+                f"cannot keep compiled equations in {compiled.cache_folder()}; set PENDULAB_CACHE to a folder"
+            )
+        return module
+
+    @property
+    def source(self) -> str:
+        """The generated source code."""
+        from pathlib import Path
+
+        return Path(str(self.code.__file__)).read_text(encoding="utf-8")
+
+    def _derive(self) -> str:
+        import sympy as sp
+
+        from toolkit.motion.generate import write_source
+
+        signed = {
+            f"{e.name}.{p.name}" for e in self.effects for p in e.parameters if p.minimum is None or p.minimum < 0
+        }
+        signed |= {n for n in self.parameters if n.startswith("formula.")}
+        known = {
+            n: sp.Symbol(n, real=True) if n in signed else sp.Symbol(n, positive=True)
+            for n in (*self.parameters, "mass_kg")
+        }
+        theta, w, tau = sp.symbols("theta w tau", real=True)
+        scale = sp.Symbol("scale", positive=True)
+        state = {"t": scale * tau, "theta": theta, "omega": w / scale}
+        motion = self._motion(
+            symbols(sympy_functions(), state, known, self.effects, self.small_angle, self.formula_text)
+        )
+        names = {"theta": theta, "w": w, "tau": tau, "scale": scale, "parameters": known}
+        return write_source(self.parameters, motion.torque, motion.inertia, names, self.latex)
+
+    @cached_property
+    def _jet(self) -> tuple[int, float]:
+        from toolkit.motion import compiled
+
+        began = time.process_time()
+        address = compiled.jet_address(self.code)
+        return address, time.process_time() - began
+
+    # -- solving -------------------------------------------------------------------------------------------------
+
+    def solve(
+        self,
+        parameters: Mapping[str, float],
+        theta0_rad: float,
+        omega0_rad_per_s: float,
+        t_s: Any,
+        accuracy_rad: float = 1e-9,
+        sensitivities: Sequence[str] = (),
+        start_s: float = 0.0,
+    ) -> Solution:
+        """θ(t) from the state at `start_s`, to within `accuracy_rad`.
+
+        parameters : values by full name (see `parameters`; more may be given).    t_s : (n,) increasing times in s,
+        not before start_s.    sensitivities : names of parameters, "theta0_rad" or "omega0_rad_per_s".
+        Raises UsageError for a missing parameter or an unknown sensitivity, JobError where the motion leaves all bounds.
+        """
+        t = np.ascontiguousarray(t_s, dtype=float)
+        if t.ndim != 1 or not np.all(np.isfinite(t)) or (t.size and (t[0] < start_s or np.any(np.diff(t) < 0))):
+            raise UsageError(f"times must be one increasing column from {start_s:g} s on; sort them")
+        if not accuracy_rad > 0:
+            raise UsageError(f"accuracy_rad must be positive, got {accuracy_rad}")
+        p = self._values(parameters)
+        return self._solve_taylor(p, theta0_rad, omega0_rad_per_s, t, accuracy_rad, tuple(sensitivities), start_s)
+
+    def _layout(self, sensitivities: tuple[str, ...]) -> tuple[Any, ...]:
+        """Where the rows of the coefficient matrix lie for these sensitivities; made once."""
+        known = self._memory.get(sensitivities)
+        if known is not None:
+            return known  # type: ignore[no-any-return]
+        code = self.code
+        rows, take, start = [list(row) for row in code.ROWS], [], [0]
+        offsets = np.concatenate([[0], np.cumsum([len(row) for row in code.PARTIAL_ROWS])])
+        for name in sensitivities:
+            if name in START:
+                rows.append([])
+            elif name in self.parameters:
+                i = self.parameters.index(name)
+                rows.append(list(code.PARTIAL_ROWS[i]))
+                take += range(offsets[i], offsets[i + 1])
+            elif name in SCENE_SYMBOLS:
+                rows.append([])  # it cancels from this equation
+            else:
+                raise UsageError(
+                    f"no parameter {name!r} in this equation{did_you_mean(name, [*self.parameters, *START])}"
+                )
+        for row in rows:
+            start.append(start[-1] + len(row))
+        columns = np.array([c for row in rows for c in row] or [0], dtype=np.int64)
+        made = (np.array(start, dtype=np.int64), columns, take, np.array(code.JACOBIAN_LENGTHS, dtype=np.int64))
+        self._memory[sensitivities] = made
+        return made
+
+    def _solve_taylor(
+        self, p: tuple[float, ...], theta0: float, omega0: float, t: np.ndarray, accuracy: float,
+        sensitivities: tuple[str, ...], start_s: float,
+    ) -> Solution:  # fmt: skip
+        from toolkit.motion import taylor
+
+        code = self.code
+        address, compile_s = self._jet
+        began = time.process_time()
+        scale = 2.0 ** round(0.5 * math.log2(p[0] / p[1]))  # p: length_m, g_m_per_s2, …
+        layout, columns, take, lengths = self._layout(sensitivities)
+        coefficients = code.coefficients(p, scale)
+        entries = coefficients[code.N_INNER :]
+        if take:
+            partials = code.partials(p, scale)
+            entries += tuple([partials[i] for i in take])
+        q, values = np.array(coefficients or (0.0,)), np.array(entries or (0.0,))
+        k = len(sensitivities)
+        initial = np.zeros((k, 2))
+        for a, name in enumerate(sensitivities):
+            if name == START[0]:
+                initial[a, 0] = 1.0
+            elif name == START[1]:
+                initial[a, 1] = scale
+        tau = t / scale
+        out = np.empty((2 + 2 * k, t.size))
+        events = np.zeros((64, 3))
+        rate = code.fastest_rate(p, scale)
+        span = (tau[-1] - start_s / scale) if t.size else 0.0
+        tolerance = max(0.1 * accuracy / (1.0 + span * (1.0 + 0.05 * span)), 1e-17)
+        evaluations = steps = 0
+        warnings: tuple[str, ...] = ()
+        for _attempt in range(6):
+            order = min(max(int(1.5 - 0.55 * math.log(tolerance)), 6), taylor.MAX_ORDER)
+            status, taken, n_events, error = taylor.integrate(
+                address, q, code.N_INNER, code.N_WORK, layout, columns, values, lengths, code.SWITCHES, code.HOLDS,
+                code.TIMED, rate, float(theta0), float(omega0) * scale, start_s / scale, tau, order, tolerance, 20_000_000,
+                initial, out, events, taylor.RECIPROCALS,
+            )  # fmt: skip
+            steps += taken
+            evaluations += taken * order
+            if status != taylor.DONE or error <= accuracy or tolerance <= 1e-17:
+                break
+            tolerance = max(tolerance * 0.3 * accuracy / error, 1e-17)
+        if status == taylor.NOT_FINITE:
+            raise JobError("the motion grows without bound or meets a singularity; check the effects' parameters")
+        if status == taylor.TOO_MANY_STEPS:
+            raise JobError(
+                "the equation needs more than 20 million steps; shorten the time or soften the stiffest effect"
+            )
+        if error > accuracy:
+            warnings = (
+                f"asked for {accuracy:.1e} rad, the estimated error is {error:.1e} rad: the motion amplifies rounding",
+            )
+        found = tuple(
+            Event(("stick", "slip")[int(kind)], float(at * scale), float(theta))
+            for kind, at, theta in events[:n_events]
+        )
+        cost = SolveCost(time.process_time() - began, compile_s, evaluations, steps)
+        return Solution(
+            t, out[0], out[1] / scale, out[2 : 2 + k].T, out[2 + k :].T / scale, f"Taylor series of order {order}",
+            cost, error, found, warnings,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Free flight: the downward pull in m/s², and the whole acceleration (t, position, velocity) where there is more."""
+
+    g_m_per_s2: float
+    acceleration: Any
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Torque (N·m), inertia (kg·m²), string tension (N) and energy (J, zero at rest at the bottom) of states."""
+
+    torque: Any
+    inertia: Any
+    tension: Any
+    energy: Any
+
+
+@lru_cache(maxsize=128)
+def _equation(names: tuple[str, ...], small_angle: bool, formula_text: str) -> Equation:
+    return Equation(tuple(load_effect(name) for name in names), small_angle, formula_text)
+
+
+def build_equation(
+    effects: Sequence[str] = (), small_angle: bool = False, formulas: Mapping[str, str] | None = None
+) -> Equation:
+    """The equation of motion of the named effects, in any order; the same call gives the same equation.
+
+    formulas : {"formula": "-a * theta**3"}, the torque of the effect `formula` where that is named.
+    Raises UsageError for an unknown effect or a formula that is not allowed.
+    """
+    text = (formulas or {}).get("formula", "")
+    if "formula" in effects:
+        from toolkit.effects.formula import formula_parameters
+
+        if not text:
+            raise UsageError('the effect "formula" needs its text: formulas={"formula": "-a*theta**3"}')
+        formula_parameters(text)
+    return _equation(tuple(sorted(set(effects))), bool(small_angle), text)

@@ -1,0 +1,202 @@
+"""The symbols in which an effect writes its term, in three kinds: SymPy, NumPy numbers and LaTeX.
+
+One term function serves all three, so that what is printed, what is compiled and what tension and energy are
+computed from cannot differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from toolkit.effects.effect import Effect, PivotMotion
+
+SCENE_SYMBOLS = {
+    "mass_kg": "m",
+    "length_m": r"\ell",
+    "g_m_per_s2": "g",
+    "bob_radius_m": "r",
+    "fluid_density_kg_per_m3": r"\rho",
+    "fluid_viscosity_pa_s": r"\mu",
+}
+
+
+class Symbols:
+    """What a term function sees.
+
+    t, theta, omega : time in s, angle in rad, angular velocity in rad/s.
+    sin_theta, cos_theta, rise : sin θ, cos θ and 1 − cos θ; θ, 1 and θ²/2 under the small-angle approximation.
+    velocity, speed : the bob's velocity along its path and its speed in m/s, against the room.
+    mass_kg, length_m, g_m_per_s2, … : the scene.    Any other name : the effect's own parameter.
+    pi, sin, cos, tan, exp, log, sqrt, tanh, abs, sign : as usual.
+    """
+
+    def __init__(self, names: Mapping[str, Any]):
+        self.__dict__.update(names)
+
+    def of(self, own: Mapping[str, Any]) -> Symbols:
+        """The same symbols with an effect's own parameters."""
+        return Symbols({**self.__dict__, **own})
+
+
+def symbols(
+    functions: Mapping[str, Any],
+    state: Mapping[str, Any],
+    values: Mapping[str, Any],
+    effects: Sequence[Effect],
+    small_angle: bool,
+    formula_text: str = "",
+) -> dict[str, Symbols]:
+    """Effect name -> its symbols. `values` maps full parameter names ("length_m", "linear_drag.k_d_kg_per_s")."""
+    theta, omega = state["theta"], state["omega"]
+    common = {**functions, **state, **{n: v for n, v in values.items() if "." not in n}, "formula_text": formula_text}
+    if small_angle:
+        common |= {"sin_theta": theta, "cos_theta": 1, "rise": theta**2 / 2}
+    else:
+        cos_theta = functions["cos"](theta)
+        common |= {"sin_theta": functions["sin"](theta), "cos_theta": cos_theta, "rise": 1 - cos_theta}
+    common |= {"velocity": common["length_m"] * omega, "pivot": None}
+    common |= {"speed": common["length_m"] * functions["abs"](omega)}
+    own = {e.name: {n.split(".")[1]: v for n, v in values.items() if n.startswith(e.name + ".")} for e in effects}
+    for effect in effects:
+        if effect.pivot is not None:
+            motion = effect.pivot(Symbols({**common, **own[effect.name]}))
+            common |= _bob_velocity(common, motion, functions)
+            common["pivot"] = motion
+    return {e.name: Symbols({**common, **own[e.name]}) for e in effects} | {"": Symbols(common)}
+
+
+def _bob_velocity(common: Mapping[str, Any], motion: PivotMotion, functions: Mapping[str, Any]) -> dict[str, Any]:
+    right, up = motion.velocity
+    along = common["velocity"] + right * common["cos_theta"] + up * common["sin_theta"]
+    across = right * common["sin_theta"] - up * common["cos_theta"]
+    return {"velocity": along, "speed": functions["sqrt"](along**2 + across**2)}
+
+
+def number_functions() -> dict[str, Any]:
+    """NumPy's functions: terms of arrays."""
+    import numpy as np
+
+    return {
+        "pi": np.pi, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log,
+        "sqrt": np.sqrt, "tanh": np.tanh, "abs": np.abs, "sign": np.sign,
+    }  # fmt: skip
+
+
+def sympy_functions() -> dict[str, Any]:
+    """SymPy's functions: terms that can be differentiated."""
+    import sympy as sp
+
+    return {
+        "pi": sp.pi, "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "exp": sp.exp, "log": sp.log,
+        "sqrt": sp.sqrt, "tanh": sp.tanh, "abs": sp.Abs, "sign": sp.sign,
+    }  # fmt: skip
+
+
+_SUM, _PRODUCT, _UNARY, _POWER, _ATOM = range(5)
+
+
+class Latex:
+    """LaTeX text that knows enough of precedence to be added, multiplied and raised to powers."""
+
+    def __init__(self, text: str, level: int = _ATOM):
+        self.text, self.level = text, level
+
+    @staticmethod
+    def of(value: Any) -> Latex:
+        """A number or LaTeX as LaTeX."""
+        if isinstance(value, Latex):
+            return value
+        number = f"{value:g}"
+        if "e" in number:
+            digits, exponent = number.split("e")
+            number = rf"{digits} \times 10^{{{int(exponent)}}}"
+        return Latex(number, _ATOM if value >= 0 else _UNARY)
+
+    def at(self, level: int) -> str:
+        """The text, in brackets where it binds less than `level`."""
+        return self.text if self.level >= level else rf"\left({self.text}\right)"
+
+    def is_zero(self) -> bool:
+        return self.text == "0"
+
+    def __add__(self, other: Any) -> Latex:
+        other = Latex.of(other)
+        if self.is_zero() or other.is_zero():
+            return other if self.is_zero() else self
+        if other.text.startswith("-"):
+            return Latex(f"{self.text} - {other.text[1:].lstrip()}", _SUM)
+        return Latex(f"{self.text} + {other.text}", _SUM)
+
+    def __radd__(self, other: Any) -> Latex:
+        return Latex.of(other) + self
+
+    def __neg__(self) -> Latex:
+        if self.is_zero():
+            return self
+        if self.text.startswith("-") and self.level == _PRODUCT:
+            return Latex(self.text[1:].lstrip(), _PRODUCT)
+        return Latex("-" + self.at(_PRODUCT), _PRODUCT)
+
+    def __sub__(self, other: Any) -> Latex:
+        return (
+            self + (-Latex.of(other))
+            if Latex.of(other).level > _SUM
+            else self + Latex("-" + Latex.of(other).at(_PRODUCT), _PRODUCT)
+        )
+
+    def __rsub__(self, other: Any) -> Latex:
+        return Latex.of(other) - self
+
+    def __mul__(self, other: Any) -> Latex:
+        other = Latex.of(other)
+        if self.text == "1" or other.text == "1":
+            return other if self.text == "1" else self
+        if self.text == "-1":
+            return -other
+        if self.is_zero() or other.is_zero():
+            return Latex("0")
+        if other.text.startswith("-"):
+            return (
+                -(self * -other)
+                if other.level == _PRODUCT
+                else Latex(rf"{self.at(_PRODUCT)} \left({other.text}\right)", _PRODUCT)
+            )
+        dot = r" \cdot " if other.text[0].isdigit() else r" "
+        return Latex(self.at(_PRODUCT) + dot + other.at(_PRODUCT), _PRODUCT)
+
+    def __rmul__(self, other: Any) -> Latex:
+        return Latex.of(other) * self
+
+    def __truediv__(self, other: Any) -> Latex:
+        if self.text.startswith("-"):
+            return -((-self) / other)
+        return Latex(rf"\frac{{{self.text}}}{{{Latex.of(other).text}}}", _PRODUCT)
+
+    def __rtruediv__(self, other: Any) -> Latex:
+        return Latex.of(other) / self
+
+    def __pow__(self, power: Any) -> Latex:
+        return Latex(rf"{{{self.at(_ATOM)}}}^{{{Latex.of(power).text}}}", _POWER)
+
+
+def latex_functions() -> dict[str, Any]:
+    """LaTeX's functions: terms that can be read."""
+
+    def named(name: str) -> Any:
+        return lambda x: Latex(
+            rf"\{name}" + (" " + x.text if len(x.text) < 8 and x.level >= _UNARY else rf"\left({x.text}\right)"),
+            _PRODUCT if len(x.text) < 8 else _POWER,
+        )
+
+    def sign(x: Latex) -> Latex:
+        return Latex(rf"\operatorname{{sgn}}\left({Latex.of(x).text}\right)", _POWER)
+
+    def absolute(x: Latex) -> Latex:
+        return Latex(rf"\left|{Latex.of(x).text}\right|")
+
+    def root(x: Latex) -> Latex:
+        return Latex(rf"\sqrt{{{Latex.of(x).text}}}")
+
+    functions = {name: named(name) for name in ("sin", "cos", "tan", "exp", "log", "tanh")}
+    return {**functions, "pi": Latex(r"\pi"), "sqrt": root, "abs": absolute, "sign": sign}

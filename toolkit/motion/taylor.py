@@ -1,0 +1,334 @@
+"""The Taylor route: series of 10 to 30 terms by generated recurrences, one integrator for every equation.
+
+Each step expands θ and w = dθ/dτ about the present time, takes the longest step that the last terms allow, reads all
+samples inside it off the polynomial, and carries along, by the linear variational equation, the sensitivities asked
+for and the global error (each step adds its own). Where the equation depends on the sign of w, the turning point is
+found to machine precision and the series starts again there; friction that can hold the pendulum holds it.
+Time and state are summed with compensation, so these functions must not be compiled with fastmath.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from toolkit.motion.generate import ROW
+from toolkit.motion.pointer import call_jet
+
+DONE, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2
+STICK, SLIP = 0, 1
+MAX_ORDER = ROW - 2
+RECIPROCALS = np.array([0.0] + [1.0 / k for k in range(1, ROW + 1)])
+
+
+@njit(cache=True)
+def _polynomial(c: Any, at: int, n: int, x: float) -> float:
+    v = c[at + n]
+    for k in range(n - 1, -1, -1):
+        v = v * x + c[at + k]
+    return v
+
+
+@njit(cache=True)
+def _above_first(c: Any, at: int, n: int, x: float) -> float:
+    """The polynomial without its constant term."""
+    v = c[at + n]
+    for k in range(n - 1, 0, -1):
+        v = v * x + c[at + k]
+    return v * x
+
+
+@njit(cache=True, fastmath={"contract"})
+def _sample(c: Any, at: int, n: int, t: Any, first: int, last: int, hi: float, lo: float, out: Any) -> None:
+    """Values of one series at the samples first … last − 1, four at a time."""
+    i = first
+    while i + 4 <= last:
+        x0, x1, x2, x3 = t[i] - hi - lo, t[i + 1] - hi - lo, t[i + 2] - hi - lo, t[i + 3] - hi - lo
+        v0 = c[at + n]
+        v1 = v0
+        v2 = v0
+        v3 = v0
+        for k in range(n - 1, -1, -1):
+            a = c[at + k]
+            v0 = v0 * x0 + a
+            v1 = v1 * x1 + a
+            v2 = v2 * x2 + a
+            v3 = v3 * x3 + a
+        out[i] = v0
+        out[i + 1] = v1
+        out[i + 2] = v2
+        out[i + 3] = v3
+        i += 4
+    while i < last:
+        out[i] = _polynomial(c, at, n, t[i] - hi - lo)
+        i += 1
+
+
+@njit(cache=True)
+def _turning_point(W: Any, n: int, h: float, sign: float) -> tuple[float, bool]:
+    """The first x in (0, h] where sign·w(x) falls below 0 (or −1), and whether w is against `sign` from the start."""
+    bound = 0.0
+    power = 1.0
+    for k in range(1, n + 1):
+        power *= h
+        bound += abs(W[ROW + k]) * power
+    if abs(W[ROW]) > bound:
+        return -1.0, False
+    left = 0.0
+    parts = 8
+    for i in range(1, parts + 1):
+        right = h * i / parts
+        if sign * _polynomial(W, ROW, n, right) < 0.0:
+            if left == 0.0 and W[ROW] == 0.0:
+                # leaving a turning point: the motion is against the sign, or turns again within this part
+                near = sign * _polynomial(W, ROW, n, right * 1e-3)
+                if near < 0.0:
+                    return -1.0, True
+                left = right * 1e-3
+            for _ in range(200):
+                middle = 0.5 * (left + right)
+                if middle <= left or middle >= right:
+                    break
+                if sign * _polynomial(W, ROW, n, middle) < 0.0:
+                    right = middle
+                else:
+                    left = middle
+            return right, False
+        left = right
+    return -1.0, False
+
+
+@njit(cache=True)
+def _force_at_rest(address: int, q: Any, s: Any, W: Any, R: Any, sign: float) -> float:
+    s[3] = sign
+    call_jet(address, q.ctypes.data, s.ctypes.data, W.ctypes.data, R.ctypes.data, 1)
+    return W[2 * ROW]
+
+
+@njit(cache=True)
+def _combine(W: Any, columns: Any, values: Any, first: int, last: int, n: int, out: Any, at: int) -> None:
+    """A row of the coefficient matrix times the basis series."""
+    for k in range(n):
+        out[at + k] = 0.0
+    for e in range(first, last):
+        row = (3 + columns[e]) * ROW
+        v = values[e]
+        for k in range(n):
+            out[at + k] += v * W[row + k]
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def _variational(J: Any, lengths: Any, D: Any, at: int, F: Any, f_at: int, forced: bool, n: int, R: Any) -> None:
+    """Series of one sensitivity: δθ' = δw, δw' = F_θ δθ + F_w δw + F_p. Rows of D: δθ at `at`, δw one row on."""
+    for k in range(n):
+        v = 0.0
+        if lengths[0] == 2:
+            for j in range(k + 1):
+                v += J[j] * D[at + k - j]
+        elif lengths[0] == 1:
+            v = J[0] * D[at + k]
+        if lengths[1] == 2:
+            for j in range(k + 1):
+                v += J[ROW + j] * D[at + ROW + k - j]
+        elif lengths[1] == 1:
+            v += J[ROW] * D[at + ROW + k]
+        if forced:
+            v += F[f_at + k]
+        D[at + k + 1] = D[at + ROW + k] * R[k + 1]
+        D[at + ROW + k + 1] = v * R[k + 1]
+
+
+@njit(cache=True)
+def integrate(
+    address: int,
+    q: Any,
+    n_inner: int,
+    n_work: int,
+    layout: Any,  # (rows + 1,) where each matrix row starts in columns/values; rows: F, F_θ, F_w, F_τ, sensitivities
+    columns: Any,
+    values: Any,
+    lengths: Any,
+    switches: bool,
+    holds: bool,
+    timed: bool,
+    rate: float,
+    theta: float,
+    w: float,
+    start: float,
+    t: Any,
+    order: int,
+    tolerance: float,
+    max_steps: int,
+    sensitivity: Any,  # (k, 2) δθ, δw at the start
+    out: Any,  # (2 + 2k, n): θ, w, δθ …, δw …
+    events: Any,  # (m, 3): kind, τ, θ
+    R: Any,
+) -> tuple[int, int, int, float]:
+    """Fill `out` at the scaled times t ≥ start. Returns status, steps, events found, largest global error of θ."""
+    n, count, k_sens = order, t.size, sensitivity.shape[0]
+    W = np.zeros(n_work * ROW)
+    J = np.zeros(2 * ROW)
+    D = np.zeros((2 * (k_sens + 1)) * ROW)
+    F = np.zeros(ROW)
+    s = np.zeros(4)
+    hi, lo = start, 0.0
+    theta_lo, w_lo = 0.0, 0.0
+    error_theta, error_w, worst = 0.0, 0.0, 0.0
+    n_events, steps, i = 0, 0, 0
+    sign = 1.0 if w > 0.0 else -1.0
+    state = 0  # 0 moving, 1 just come to rest or starting at rest, 2 held
+    if switches and w == 0.0:
+        state = 1
+    seed = 1
+    for a in range(k_sens):
+        D[2 * a * ROW] = sensitivity[a, 0]
+        D[(2 * a + 1) * ROW] = sensitivity[a, 1]
+    end = t[count - 1] if count > 0 else start
+    while i < count and t[i] <= start:
+        out[0, i] = theta
+        out[1, i] = w
+        for a in range(k_sens):
+            out[2 + a, i] = D[2 * a * ROW]
+            out[2 + k_sens + a, i] = D[(2 * a + 1) * ROW]
+        i += 1
+    while i < count:
+        if steps >= max_steps:
+            return TOO_MANY_STEPS, steps, n_events, worst
+        s[0], s[1], s[2] = hi + lo, theta, w
+        if state == 1:  # at rest: which way, or held?
+            before = _force_at_rest(address, q, s, W, R, sign)
+            up, down = _force_at_rest(address, q, s, W, R, 1.0), _force_at_rest(address, q, s, W, R, -1.0)
+            if holds and up <= 0.0 and down >= 0.0:
+                state = 2
+                after = 0.0
+            else:
+                if up > 0.0:
+                    sign, after = 1.0, up
+                elif down < 0.0:
+                    sign, after = -1.0, down
+                else:
+                    after = 0.0
+                state = 0
+            if n_events > 0 or steps > 0:  # δw jumps by the ratio of the accelerations
+                ratio = after / before if before != 0.0 else 1.0
+                for a in range(k_sens):
+                    D[(2 * a + 1) * ROW] *= ratio
+                error_w *= ratio
+            if state == 2 and n_events < events.shape[0]:
+                events[n_events, 0], events[n_events, 1], events[n_events, 2] = STICK, hi + lo, theta
+                n_events += 1
+        if state == 2:  # held: find when the torque exceeds the friction
+            until = end
+            freed = False
+            if timed:
+                step = math.pi / 64.0 / rate
+                left = hi + lo
+                while left < end and not freed:
+                    right = min(left + step, end)
+                    for way in (1.0, -1.0):
+                        s[0] = right
+                        if not freed and way * _force_at_rest(address, q, s, W, R, way) > 0.0:
+                            low, high = left, right
+                            for _ in range(200):
+                                middle = 0.5 * (low + high)
+                                if middle <= low or middle >= high:
+                                    break
+                                s[0] = middle
+                                if way * _force_at_rest(address, q, s, W, R, way) > 0.0:
+                                    high = middle
+                                else:
+                                    low = middle
+                            until, sign, freed = high, way, True
+                    left = right
+                    steps += 1
+            while i < count and t[i] <= until:
+                out[0, i] = theta
+                out[1, i] = 0.0
+                for a in range(k_sens):
+                    out[2 + a, i] = D[2 * a * ROW]
+                    out[2 + k_sens + a, i] = 0.0
+                i += 1
+            for a in range(k_sens):
+                D[(2 * a + 1) * ROW] = 0.0
+            error_w = 0.0
+            hi, lo = until, 0.0
+            state = 0
+            if freed and n_events < events.shape[0]:
+                events[n_events, 0], events[n_events, 1], events[n_events, 2] = SLIP, until, theta
+                n_events += 1
+            continue
+        s[0], s[3] = hi + lo, sign
+        call_jet(address, q.ctypes.data, s.ctypes.data, W.ctypes.data, R.ctypes.data, n)
+        steps += 1
+        last = max(abs(W[n]), abs(W[ROW + n]))
+        previous = max(abs(W[n - 1]), abs(W[ROW + n - 1]))
+        h = end - hi - lo
+        if last > 0.0:
+            h = min(h, math.exp(math.log(tolerance / last) / n))
+        if previous > 0.0:
+            h = min(h, math.exp(math.log(tolerance / previous) / (n - 1)))
+        if not (h > 0.0 and h < 1e300):
+            return NOT_FINITE, steps, n_events, worst
+        turned = False
+        if switches:
+            root, against = _turning_point(W, n, h, sign)
+            if against:
+                sign = -sign
+                s[3] = sign
+                call_jet(address, q.ctypes.data, s.ctypes.data, W.ctypes.data, R.ctypes.data, n)
+                root, against = _turning_point(W, n, h, sign)
+            if root >= 0.0:
+                h, turned = root, True
+        _combine(W, columns, values, layout[1], layout[2], n if lengths[0] == 2 else 1, J, 0)
+        _combine(W, columns, values, layout[2], layout[3], n if lengths[1] == 2 else 1, J, ROW)
+        for a in range(k_sens):
+            forced = layout[5 + a] > layout[4 + a]
+            if forced:
+                _combine(W, columns, values, layout[4 + a], layout[5 + a], n, F, 0)
+            _variational(J, lengths, D, 2 * a * ROW, F, 0, forced, n, R)
+        at = 2 * k_sens * ROW
+        D[at], D[at + ROW] = error_theta, error_w
+        _variational(J, lengths, D, at, F, 0, False, n, R)
+        # samples inside this step
+        j = i
+        reach = hi + lo + h
+        while j < count and (t[j] <= reach or (t[j] - hi) - lo <= h):
+            j += 1
+        if j > i:
+            _sample(W, 0, n, t, i, j, hi, lo, out[0])
+            _sample(W, ROW, n, t, i, j, hi, lo, out[1])
+            for a in range(k_sens):
+                _sample(D, 2 * a * ROW, n, t, i, j, hi, lo, out[2 + a])
+                _sample(D, (2 * a + 1) * ROW, n, t, i, j, hi, lo, out[2 + k_sens + a])
+            i = j
+        # the next state, with what the last sums lost
+        change = _above_first(W, 0, n, h) + theta_lo
+        new = theta + change
+        theta_lo = change - (new - theta)
+        theta = new
+        change = _above_first(W, ROW, n, h) + w_lo
+        new = w + change
+        w_lo = change - (new - w)
+        w = new
+        change = h + lo
+        new = hi + change
+        lo = change - (new - hi)
+        hi = new
+        for a in range(2 * k_sens):
+            D[a * ROW] = _polynomial(D, a * ROW, n, h)
+        error_theta = _polynomial(D, at, n, h)
+        error_w = _polynomial(D, at + ROW, n, h)
+        power = h**n
+        seed = (seed * 1103515245 + 12345) % 2147483648
+        noise = 0.5 if seed < 1073741824 else -0.5  # rounding errors add like a random walk
+        local = 0.25 * power
+        rounding = 2.2e-16 * noise
+        error_theta += math.copysign(local * abs(W[n]), error_theta) + rounding * abs(theta)
+        error_w += math.copysign(local * abs(W[ROW + n]), error_w) + rounding * abs(w)
+        worst = max(worst, abs(error_theta))
+        if turned:
+            w, w_lo, state = 0.0, 0.0, 1
+    return DONE, steps, n_events, worst
