@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.errors import UsageError
+from toolkit.errors import PendulabError, UsageError
 from toolkit.fit import FitResult, FittedParameter
 from toolkit.guess import Guess, guess, guess_from_integrals, point_noise
 from toolkit.models import load_model
@@ -40,6 +40,7 @@ UNITS = {
     "time_scale": "1",
 }
 _DRAG_NAMES = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
+_NOT_GUESSED = ("theta_offset", "angle_scale", "time_scale", "f0", "f", "drive_phase")
 _LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 _BAD = 1e10
 
@@ -159,10 +160,14 @@ class Problem:
 
     def _starts(self, start: Mapping[str, float]) -> Iterator[dict[str, float]]:
         """First the guess (with what is given in its place), then others, each cheaper to compute than a fit."""
+        given = {name: value for name, value in start.items() if name in self.free}
+        guessed = [name for name in self.free if name not in _NOT_GUESSED]
+        if all(name in given for name in guessed):
+            yield {**self.values, **given}
         begin = {**self.values, **self._from_guess(self._guess())}
-        yield {**begin, **{k: v for k, v in start.items() if k in self.free}}
-        if start:
-            yield begin
+        if given:
+            yield {**begin, **given}
+        yield begin
         yield from self._grown()
 
     def _guess(self) -> Guess:
@@ -317,7 +322,7 @@ class Problem:
         try:
             seen, by, _ = self.predict(values, free)
             whole = bool(np.all(np.isfinite(seen)) and np.all(np.isfinite(by)))
-        except (UsageError, ValueError, ArithmeticError, RuntimeError):
+        except (PendulabError, ValueError, ArithmeticError, RuntimeError):
             whole = False
         if not whole:
             return np.full(measured.size + rows, _BAD), np.zeros((measured.size + rows, len(free)))
@@ -350,7 +355,7 @@ class Problem:
     def _report(self, found: Solved) -> FitResult:
         from toolkit.derived import derive
 
-        values = _tidied(found.values)
+        values = _tidied(found.values, self.model.small_angle)
         seen, by, motion = self.predict(values, self.free)
         residual = self.series.theta_rad - seen
         n, k = residual.size, len(self.free) - len(self.priors)
@@ -559,9 +564,11 @@ def pose(
     )
 
 
-def _tidied(values: Mapping[str, float]) -> dict[str, float]:
-    """θ₀ ≥ 0 and −π < φ ≤ π: the same motion."""
+def _tidied(values: Mapping[str, float], small_angle: bool) -> dict[str, float]:
+    """θ₀ ≥ 0 (and ≤ π with the full sine) and −π < φ ≤ π: the same motion."""
     tidy = dict(values)
+    if not small_angle:  # only sin(θ₀/2) counts
+        tidy["theta0"] = 2 * math.asin(math.sin(tidy["theta0"] / 2))
     if tidy["theta0"] < 0:
         tidy["theta0"], tidy["phi"] = -tidy["theta0"], tidy["phi"] + math.pi
     tidy["phi"] = math.remainder(tidy["phi"], 2 * math.pi)
