@@ -99,7 +99,7 @@ def _encoder(codec: dict[str, Any], suffix: str) -> tuple[str, dict[str, str], s
         return "ffv1", {}, "yuv444p"
     if name == "mjpeg":
         return "mjpeg", {} if rated else {"qmin": "2", "qmax": "3"}, "yuvj420p"
-    options = {"g": interval, "preset": "veryfast" if name == "h264" else "ultrafast"}
+    options = {"g": interval, "preset": codec.get("preset", "veryfast" if name == "h264" else "ultrafast")}
     if name == "h264":
         options["x264-params"] = "mbtree=0"  # with it, small pictures are not encoded the same way twice
     if name == "hevc":
