@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _STRETCH_PERIODS = 2.0
-_MOST_STRETCHES = 60
+_MOST_STRETCHES = 40
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def guess(
     half = _half_period(crossings)
     if half is None:
         return guess_from_integrals(t_s, theta_rad, small_angle=small_angle)
-    stretches = _stretches(t_s, theta_rad, half)
+    stretches = _stretches(t_s, theta_rad, half, crossings)
     if len(stretches) < 1 or crossings.size < 4:
         return guess_from_integrals(t_s, theta_rad, small_angle=small_angle)
     time, amplitude, omega, phase, middle, weight = (np.array(column) for column in zip(*stretches))
@@ -108,7 +108,7 @@ def _half_period(crossings: np.ndarray) -> float | None:
 
 
 def _stretches(
-    t_s: np.ndarray, theta: np.ndarray, half: float
+    t_s: np.ndarray, theta: np.ndarray, half: float, crossings: np.ndarray
 ) -> list[tuple[float, float, float, float, float, float]]:
     """(time, amplitude, ω, phase at that time, middle, weight) of stretches of about two periods along the record.
 
@@ -126,43 +126,44 @@ def _stretches(
         step = max(1, (high - low) // 400)
         t, x = t_s[low:high:step], theta[low:high:step]
         centre = 0.5 * (t[0] + t[-1])
+        first, last = np.searchsorted(crossings, [begin - half, begin + width + half])
+        if last - first > 2:
+            omega = math.pi / float(np.median(np.diff(crossings[first:last])))
         fit = _local_sine(t - centre, x, omega)
         if fit is None:
             continue
         amplitude, omega_here, phase, middle = fit
         found.append((centre, amplitude, omega_here, phase, middle, float(t.size)))
-        omega = omega_here
     return found
 
 
 def _local_sine(t: np.ndarray, x: np.ndarray, omega: float) -> tuple[float, float, float, float] | None:
-    """One sine with a middle and a third harmonic; ω by a scan and then Gauss–Newton. None where it does not settle."""
-
-    def solve(w: float) -> tuple[np.ndarray, float]:
-        columns = np.stack(
-            [np.cos(w * t), np.sin(w * t), np.ones_like(t), np.cos(3 * w * t), np.sin(3 * w * t)], axis=1
-        )
-        gram = columns.T @ columns
+    """One sine with a middle and a third harmonic, ω by Gauss–Newton from `omega`. None where it does not settle."""
+    begin = omega
+    columns = np.empty((t.size, 6))
+    columns[:, 2] = 1.0
+    a = b = middle = 0.0
+    for step in range(6):
+        cosine, sine = np.cos(omega * t), np.sin(omega * t)
+        columns[:, 0], columns[:, 1] = cosine, sine
+        columns[:, 3], columns[:, 4] = cosine * (4 * cosine**2 - 3), sine * (3 - 4 * sine**2)
+        columns[:, 5] = t * (b * cosine - a * sine)
+        used = columns if step else columns[:, :5]
+        gram = used.T @ used
         gram[np.diag_indices_from(gram)] *= 1 + 1e-9
-        solution = np.linalg.solve(gram, columns.T @ x)
-        return solution, float(np.sum((x - columns @ solution) ** 2))
-
-    scale = np.array([0.6, 0.75, 0.87, 0.94, 1.0, 1.06, 1.14, 1.3, 1.6])
-    try:
-        best = min(scale, key=lambda s: solve(omega * s)[1])
-        low, high = omega * best * 0.9, omega * best * 1.1
-        for _ in range(18):  # golden section: the sum of squares has one dip this close
-            third = (high - low) * 0.381966
-            if solve(low + third)[1] < solve(high - third)[1]:
-                high -= third
-            else:
-                low += third
-        omega = 0.5 * (low + high)
-        solution, _ = solve(omega)
-    except np.linalg.LinAlgError:
-        return None
-    a, b, middle = solution[:3]
-    return math.hypot(a, b), omega, math.atan2(-b, a), float(middle)
+        try:
+            solution = np.linalg.solve(gram, used.T @ x)
+        except np.linalg.LinAlgError:
+            return None
+        a, b, middle = (float(v) for v in solution[:3])
+        if step:
+            change = float(np.clip(solution[5], -0.1 * omega, 0.1 * omega))
+            omega += change
+            if not 0.5 * begin < omega < 2 * begin:
+                return None
+            if abs(change) < 1e-5 * omega:
+                break
+    return math.hypot(a, b), omega, math.atan2(-b, a), middle
 
 
 def frequency_ratio(peak_rad: np.ndarray) -> np.ndarray:

@@ -57,6 +57,15 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class _Start:
+    """θ(0), θ̇(0), and for theta0, phi and omega_g the derivatives of both."""
+
+    theta: float
+    omega: float
+    by: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
 class Model:
     """A pendulum model.
 
@@ -137,8 +146,15 @@ class Model:
         """
         if self.closed_form:
             return self._closed_form(values, t_s, by)
+        parameters, scale = self._parameters(values)
+        start = self._start(values)
+        if self.fixed or "cosine_drive" in self.effects:
+            return self._moved(parameters, scale, start, values, t_s, by)
+        return self._free(parameters, scale, start, values, t_s, by)
+
+    def _parameters(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+        """The equation's parameters, and by how much each grows with its reduced coefficient."""
         mass, length = self.fixed.get("mass_kg", 1.0), self.fixed.get("length_m", 1.0)
-        omega_g = values["omega_g"]
         scale = {
             "alpha_d": 2 * mass,
             "beta": mass / length,
@@ -147,59 +163,118 @@ class Model:
             "f": 1.0,
             "drive_phase": 1.0,
         }
-        parameters = {"mass_kg": 1.0, "length_m": 1.0, **self.fixed, "g_m_per_s2": omega_g**2 * length}
+        parameters = {"mass_kg": 1.0, "length_m": 1.0, **self.fixed, "g_m_per_s2": values["omega_g"] ** 2 * length}
         parameters |= {_EQUATION_NAME[name]: scale[name] * values[name] for name in self.coefficients}
-        theta_start, omega_start, start_by = self._start(values)
-        starts = [name for name in ("theta0", "phi", "omega_g") if name in by]
+        return parameters, {name: scale[name] for name in self.coefficients}
+
+    def _moved(
+        self,
+        parameters: dict[str, float],
+        scale: dict[str, float],
+        start: _Start,
+        values: Mapping[str, float],
+        t_s: np.ndarray,
+        by: Sequence[str],
+    ) -> Motion:
+        """Any equation: every derivative from the variational equations."""
         asked = [_EQUATION_NAME[name] for name in by if name in scale]
+        if any(name in start.by for name in by):
+            asked += ["theta0_rad", "omega0_rad_per_s"]
         if "omega_g" in by:
             asked.append("g_m_per_s2")
-        if starts:
-            asked += ["theta0_rad", "omega0_rad_per_s"]
-        solution = self._equation().solve(
-            parameters, theta_start, omega_start, t_s, accuracy_rad=_ACCURACY_RAD, sensitivities=tuple(asked)
-        )
-        column = {name: i for i, name in enumerate(asked)}
-        blocks = []
-        for block in (solution.d_theta, solution.d_omega) if asked else ():
-            out = np.empty((len(t_s), len(by)))
+        solution = self._solve(parameters, start, t_s, asked)
+        d_theta, d_omega = np.empty((2, len(t_s), len(by)))
+        for block, out in ((solution.d_theta, d_theta), (solution.d_omega, d_omega)):
             for i, name in enumerate(by):
                 if name in scale:
-                    out[:, i] = scale[name] * block[:, column[_EQUATION_NAME[name]]]
+                    out[:, i] = scale[name] * block[:, asked.index(_EQUATION_NAME[name])]
                     continue
-                by_theta, by_omega = start_by[name]
-                out[:, i] = by_theta * block[:, column["theta0_rad"]] + by_omega * block[:, column["omega0_rad_per_s"]]
+                by_theta, by_omega = start.by[name]
+                first = asked.index("theta0_rad")
+                out[:, i] = by_theta * block[:, first] + by_omega * block[:, first + 1]
                 if name == "omega_g":
-                    out[:, i] += 2 * omega_g * length * block[:, column["g_m_per_s2"]]
-            blocks.append(out)
-        d_theta, d_omega = blocks or (np.empty((len(t_s), 0)), np.empty((len(t_s), 0)))
+                    g_by_omega = 2 * parameters["g_m_per_s2"] / values["omega_g"]
+                    out[:, i] += g_by_omega * block[:, asked.index("g_m_per_s2")]
         return Motion(solution.theta_rad, solution.omega_rad_per_s, d_theta, d_omega, solution.method)
 
-    def _start(self, values: Mapping[str, float]) -> tuple[float, float, dict[str, tuple[float, float]]]:
-        """θ(0), θ̇(0), and for each start coefficient the derivatives of both."""
+    def _free(
+        self,
+        parameters: dict[str, float],
+        scale: dict[str, float],
+        start: _Start,
+        values: Mapping[str, float],
+        t_s: np.ndarray,
+        by: Sequence[str],
+    ) -> Motion:
+        """The reduced equation without a drive. Two variational equations fewer: time does not appear in it, so a shift
+        in time (θ̇, θ̈) is the derivative along one start; and a unit of time can be chosen, so that
+        ω_g ∂θ/∂ω_g = t θ̇ − α_d ∂θ/∂α_d − 2 μ ∂θ/∂μ at the same θ₀, φ."""
+        coefficients = [name for name in by if name in scale]
+        if "omega_g" in by:
+            coefficients += [n for n in ("alpha_d", "mu") if n in scale and n not in by and values[n] != 0]
+        asked = [_EQUATION_NAME[name] for name in coefficients]
+        moving = "theta0" in by or "phi" in by
+        by_omega_start = abs(start.omega) * values["omega_g"] >= abs(self._acceleration(values, start.theta, start.omega))
+        if moving:
+            asked.append("omega0_rad_per_s" if by_omega_start else "theta0_rad")
+        solution = self._solve(parameters, start, t_s, asked)
+        theta, omega = solution.theta_rad, solution.omega_rad_per_s
+        if not by:
+            return Motion(theta, omega, np.empty((len(t_s), 0)), np.empty((len(t_s), 0)), solution.method)
+        acceleration = self._acceleration(values, theta, omega)
+        at_start = float(self._acceleration(values, start.theta, start.omega))
+        d_theta, d_omega = np.empty((2, len(t_s), len(by)))
+        for block, out, rate in ((solution.d_theta, d_theta, omega), (solution.d_omega, d_omega, acceleration)):
+            along = {name: scale[name] * block[:, i] for i, name in enumerate(coefficients)}
+            for i, name in enumerate(by):
+                if name in along:
+                    out[:, i] = along[name]
+                elif name == "omega_g":
+                    out[:, i] = t_s * rate + (omega if out is d_omega else 0.0)
+                    for other, power in (("alpha_d", 1), ("mu", 2)):
+                        if other in along:
+                            out[:, i] -= power * values[other] * along[other]
+                    out[:, i] /= values["omega_g"]
+                else:  # a start is so much of a shift in time and so much of the one that was solved for
+                    by_theta, by_omega = start.by[name]
+                    if by_omega_start:
+                        shift = by_theta / start.omega
+                        left = by_omega - shift * at_start
+                    else:
+                        shift = by_omega / at_start
+                        left = by_theta - shift * start.omega
+                    out[:, i] = shift * rate + left * block[:, -1]
+        return Motion(theta, omega, d_theta, d_omega, solution.method)
+
+    def _solve(self, parameters: dict[str, float], start: _Start, t_s: np.ndarray, asked: Sequence[str]) -> Any:
+        return self._equation().solve(
+            parameters, start.theta, start.omega, t_s, accuracy_rad=_ACCURACY_RAD, sensitivities=tuple(asked)
+        )
+
+    def _acceleration(self, values: Mapping[str, float], theta: Any, omega: Any) -> Any:
+        """θ̈ of the reduced equation without a drive."""
+        alpha_d, beta, mu = (values[n] if n in self.coefficients else 0.0 for n in ("alpha_d", "beta", "mu"))
+        back = values["omega_g"] ** 2 * (theta if self.small_angle else np.sin(theta))
+        return -back - (2 * alpha_d + beta * np.abs(omega)) * omega - mu * np.sign(omega)
+
+    def _start(self, values: Mapping[str, float]) -> _Start:
         theta0, phi, omega_g = values["theta0"], values["phi"], values["omega_g"]
         sine, cosine = math.sin(phi), math.cos(phi)
         if self.small_angle:
-            return (
-                theta0 * sine,
-                theta0 * omega_g * cosine,
-                {
-                    "theta0": (sine, omega_g * cosine),
-                    "phi": (theta0 * cosine, -theta0 * omega_g * sine),
-                    "omega_g": (0.0, theta0 * cosine),
-                },
-            )
+            by = {
+                "theta0": (sine, omega_g * cosine),
+                "phi": (theta0 * cosine, -theta0 * omega_g * sine),
+                "omega_g": (0.0, theta0 * cosine),
+            }
+            return _Start(theta0 * sine, theta0 * omega_g * cosine, by)
         kappa, d_kappa = math.sin(theta0 / 2), math.cos(theta0 / 2) / 2
         root = math.sqrt(max(1 - (kappa * sine) ** 2, 1e-300))
-        return (
-            2 * math.asin(kappa * sine),
-            2 * kappa * omega_g * cosine,
-            {
-                "theta0": (2 * d_kappa * sine / root, 2 * d_kappa * omega_g * cosine),
-                "phi": (2 * kappa * cosine / root, -2 * kappa * omega_g * sine),
-                "omega_g": (0.0, 2 * kappa * cosine),
-            },
-        )
+        by = {
+            "theta0": (2 * d_kappa * sine / root, 2 * d_kappa * omega_g * cosine),
+            "phi": (2 * kappa * cosine / root, -2 * kappa * omega_g * sine),
+            "omega_g": (0.0, 2 * kappa * cosine),
+        }
+        return _Start(2 * math.asin(kappa * sine), 2 * kappa * omega_g * cosine, by)
 
     def _equation(self) -> Any:
         return _equation(self.effects, self.small_angle)
