@@ -33,9 +33,7 @@ def reproduce_paper(folder: str | Path, progress: Progress = silent) -> str:
     with (folder / "claims.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["claim", "statement", "regime", "phi", "model", "verdict", "deciding_numbers"])
-        writer.writerows(
-            [j.claim, j.statement, j.regime, j.phi, j.model, j.verdict, j.numbers] for j in judgements
-        )
+        writer.writerows([j.claim, j.statement, j.regime, j.phi, j.model, j.verdict, j.numbers] for j in judgements)
     lines = ["claim  regime     φ    small angle     full equation"]
     table = {(j.claim, j.regime, j.phi, j.model): j.verdict for j in judgements}
     for claim, regime, phi in dict.fromkeys((j.claim, j.regime, j.phi) for j in judgements):

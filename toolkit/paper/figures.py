@@ -87,11 +87,10 @@ def draw_misprints(folder: Path) -> list[Path]:
         rows = zip(("(18)", "(19)"), (r"$\theta_i$ (rad)", r"$\dot{\theta}_i$ (rad/s)"), right, printed, strict=True)
         for column, (equation, label, good, bad) in enumerate(rows):
             top, bottom = grid[0][column], grid[1][column]
-            top.plot(t, good, color=COLOURS[0], label=f"{equation} derived")
+            top.plot(t, good, color=COLOURS[0], label=f"{equation} as derived")
             top.plot(t, bad, color=COLOURS[1], dashes=(4, 1.5), label=f"{equation} as printed")
             top.set_ylabel(label)
-            top.set_title(f"equation {equation}", loc="left", fontsize=8)
-            top.legend(loc="lower left", ncols=2, bbox_to_anchor=(0.3, 1.0), borderaxespad=0.2)
+            top.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0, handlelength=1.6)
             bottom.plot(t, bad - good, color="black")
             worst = int(np.argmax(np.abs(bad - good)))
             bottom.plot(t[worst], (bad - good)[worst], "o", color=COLOURS[1], markersize=3)
@@ -113,6 +112,7 @@ def _draw(axes: Any, sweep: Sweep, phi: str, field: str, label: str) -> None:
                 linewidth=1.0 if model == "full equation" else 0.8,
             )
     axes.set_xlim(_SPAN_S[0], _SPAN_S[-1])
+    axes.set_xticks(range(0, 21, 5))
     axes.set_xlabel(r"$t$ (s)")
     axes.set_ylabel(label)
 
@@ -134,20 +134,17 @@ def _handles(sweep: Sweep) -> list[Any]:
 def _fixed(sweep: Sweep) -> str:
     """What the other three parameters are."""
     case = sweep.cases()[0]
-    parts = [
-        rf"${_SYMBOLS[s.field]}$ = {getattr(case, s.field):g} {s.unit}" for s in SWEEPS if s.field != sweep.field
-    ]
+    parts = [rf"${_SYMBOLS[s.field]}$ = {getattr(case, s.field):g} {s.unit}" for s in SWEEPS if s.field != sweep.field]
     return ", ".join(parts)
 
 
 def _name_lines(figure: Any, axes: Any, sweep: Sweep, phi: str) -> None:
     from matplotlib.lines import Line2D
 
-    models = [
-        Line2D([], [], color="0.2", dashes=_DASHES[m], linewidth=1.0, label=m) for m in reversed(MODELS)
-    ]
+    models = [Line2D([], [], color="0.2", dashes=_DASHES[m], linewidth=1.0, label=m) for m in reversed(MODELS)]
+    first, second, third = _handles(sweep)
     figure.legend(
-        handles=[*_handles(sweep), *models],
+        handles=[first, models[0], second, models[1], third],  # filled column by column
         loc="outside upper center",
         ncols=3,
         columnspacing=1.0,
@@ -168,6 +165,7 @@ def _new_figure(width: float, height: float, shape: tuple[int, int] | None = Non
 
 def _save(figure: Any, stem: Path) -> list[Path]:
     written = [stem.with_suffix(".png"), stem.with_suffix(".svg")]
-    figure.savefig(written[0], dpi=300)
+    figure.savefig(written[0], dpi=300 if figure.get_figwidth() < 8 else 200)
+    figure.set_layout_engine("none")  # as laid out already
     figure.savefig(written[1], metadata={"Date": None})
     return written

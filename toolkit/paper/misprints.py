@@ -40,9 +40,9 @@ def driven_part(case: Case, t_s: np.ndarray, printed: bool = False) -> tuple[np.
     return theta_printed, rate - alpha * scale * sin * (first_19 + second_19 - first - second)
 
 
-def misprint_errors(case: Case = Case()) -> tuple[float, float, float]:
+def misprint_errors() -> tuple[float, float, float]:
     """Largest errors over 0 … 20 s: of (18) as printed (rad), of (19) as printed (rad/s), and of small angles (rad)."""
-    t = np.linspace(0, 20, 4001)
+    t, case = np.linspace(0, 20, 4001), Case()
     (theta, rate), (theta_printed, rate_printed) = driven_part(case, t), driven_part(case, t, printed=True)
     models = [solve_case(case, model, math.pi / 2, t).theta for model in ("small angle", "full equation")]
     differences = (theta_printed - theta, rate_printed - rate, models[0] - models[1])
