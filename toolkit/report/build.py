@@ -1,0 +1,477 @@
+"""From an Analysis to a Report: essentials first, then the details."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.report.document import Block, Equation, Fact, Figure, Paragraph, Report, Section, Table, Verdict
+from toolkit.report.material import PAPER, Material, parameter, value
+from toolkit.report.numbers import number, percent, with_uncertainty
+from toolkit.report.words import Words, load_words
+
+if TYPE_CHECKING:
+    from toolkit.analyse import Analysis
+    from toolkit.checks.finding import Finding
+    from toolkit.fit import FitResult
+
+MAIN = ("small_angle", "linear_drag")
+DRAGS = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
+
+
+def build(analysis: Analysis, lang: str) -> Report:
+    """The report in a language. Raises UsageError for an unknown one."""
+    from toolkit import __version__
+
+    words = load_words(lang)
+    material = Material(analysis, words)
+    sections = [
+        _experiment(material),
+        _equation(material),
+        _motion(material),
+        _residuals(material),
+        _models(material),
+        _budget(material),
+        _findings(material),
+        _cost(material),
+        _methods(material),
+        _references(material),
+    ]
+    return Report(
+        title=words("page.title"),
+        subtitle=analysis.source.name,
+        lead=lead(material),
+        facts=facts(material),
+        verdicts=verdicts(material),
+        sections=tuple(s for s in sections if s is not None),
+        footer=words("page.footer", version=__version__),
+        words=words,
+        sheets=_sheets(material),
+    )
+
+
+# -- the first page ---------------------------------------------------------------------------------------------------
+
+
+def lead(material: Material) -> str:
+    """One sentence on what was measured."""
+    words, series, cycles = material.words, material.analysis.series, material.cycles
+    widest = float(np.max(np.abs(material.theta - material.offset)))
+    common = {"points": len(series), "duration": number(series.duration_s, 3)}
+    if cycles is None:
+        text = words("page.lead_few", first=number(math.degrees(widest), 3), **common)
+    else:
+        ends = cycles.amplitude_rad[0], cycles.amplitude_rad[-1]
+        first, last = (number(math.degrees(a), 3) for a in ends)
+        swings = round(series.duration_s / float(np.median(cycles.period_s)))
+        text = words("page.lead", swings=swings, first=first, last=last, **common)
+    recorded = series.meta.get("recorded_on")
+    return f"{text} {words('page.recorded', date=words.date(recorded))}" if recorded else text
+
+
+def facts(material: Material) -> tuple[Fact, ...]:
+    """The five answers that a student looks for, and the numbers beside them."""
+    words, best, scene = material.words, material.best, material.analysis.scene
+    if not best.success:
+        return (Fact(words("question.drag"), words("answer.failed"), best.message),)
+    found = [
+        Fact(
+            words("question.drag"),
+            _drag_answer(material, best),
+            words("answer.model", model=model_name(words, best.model)),
+        )
+    ]
+    found.append(Fact(words("question.sure"), _sure(material, best), _inflation(words, best)))
+    paper = material.paper
+    if paper is not None and paper is not best and paper.success:
+        wrong = any(f.verdict == "fails" for f in material.analysis.findings if f.assumption in MAIN)
+        remark = words("answer.paper_wrong" if wrong else "answer.paper_off")
+        found.append(Fact(words("question.drag_paper"), _drag_answer(material, paper), remark))
+    for name in MAIN:
+        finding = _finding(material, name)
+        if finding is not None:
+            found.append(Fact(words(f"question.{name}"), _short_answer(words, finding), ""))
+    period = parameter(best, "T0")
+    if period is not None:
+        found.append(
+            Fact(
+                words("question.period"),
+                f"{_symbol(words, 'T0')} = {with_uncertainty(period.value, period.stderr, 's')}",
+            )
+        )
+    g = scene.environment.gravity_m_per_s2
+    for name in ("length", "equivalent_length"):
+        length = parameter(best, name)
+        if length is not None:
+            given = name == "length" and length.fixed
+            remark = words("answer.given_length") if given else words("answer.equivalent", g=number(g, 6))
+            found.append(Fact(words("question.length"), with_uncertainty(length.value, length.stderr, "m"), remark))
+            break
+    return tuple(found)
+
+
+def _drag_answer(material: Material, result: FitResult) -> str:
+    """The drag coefficients of a model with their uncertainties, `;` between them."""
+    words, parts = material.words, []
+    for name in DRAGS:
+        found = result.parameters.get(name)
+        if found is None:
+            continue
+        if found.stderr and found.value < found.stderr:
+            bound = number(max(found.value, 0) + 1.645 * found.stderr, 2)
+            unit = with_uncertainty(1.0, None, found.unit)[1:].strip()
+            parts.append(words("answer.zero_drag", symbol=_symbol(words, name), bound=f"{bound} {unit}".strip()))
+        else:
+            parts.append(f"{_symbol(words, name)} = {with_uncertainty(found.value, found.stderr, found.unit)}")
+    return "; ".join(parts) or "–"
+
+
+def _sure(material: Material, result: FitResult) -> str:
+    words, parts = material.words, []
+    for name in DRAGS:
+        found = result.parameters.get(name)
+        if found is not None and found.stderr and found.value > found.stderr:
+            parts.append((_symbol(words, name), percent(found.stderr / found.value)))
+    if not parts:
+        return "–"
+    listed = parts[0][1] if len(parts) == 1 else ", ".join(f"{symbol} {share}" for symbol, share in parts)
+    return words("answer.sure", percent=listed, sigma="±")
+
+
+def _inflation(words: Words, result: FitResult) -> str:
+    factor = float(result.noise.get("inflation", 1.0) or 1.0)
+    return words("answer.inflated", factor=number(factor, 2)) if factor > 1.15 else ""
+
+
+def _short_answer(words: Words, finding: Finding) -> str:
+    """Yes, no or cannot tell, with the angle that divides."""
+    where, evidence = finding.where, finding.evidence
+    if finding.verdict == "not_distinguishable":
+        return words("answer.unclear")
+    if finding.assumption == "small_angle":
+        widest = evidence.get("amplitude_max_rad")
+        if finding.verdict == "fails" and "amplitude_above_rad" in where:
+            angle = number(math.degrees(where["amplitude_above_rad"]), 2)
+            return words("answer.no_to", angle=angle, widest=number(math.degrees(widest), 3) if widest else "–")
+        if finding.verdict == "holds" and widest:
+            return words("answer.yes_to", angle=number(math.degrees(widest), 2))
+    if finding.verdict == "fails" and "amplitude_above_rad" in where:
+        return words("answer.above", angle=number(math.degrees(where["amplitude_above_rad"]), 2))
+    if finding.verdict == "fails" and "amplitude_below_rad" in where:
+        return words("answer.below", angle=number(math.degrees(where["amplitude_below_rad"]), 2))
+    return words("answer.yes" if finding.verdict == "holds" else "answer.no")
+
+
+def verdicts(material: Material) -> tuple[Verdict, ...]:
+    """The two verdicts, each with the picture that shows it."""
+    from toolkit.report.figures.decay import decay
+    from toolkit.report.figures.period import period
+
+    pictures = {"small_angle": period, "linear_drag": decay}
+    cards = []
+    for name in MAIN:
+        finding = _finding(material, name)
+        if finding is not None:
+            cards.append(_card(material.words, finding, pictures[name](material)))
+    return tuple(cards)
+
+
+def _card(words: Words, finding: Finding, figure: Figure | None) -> Verdict:
+    return Verdict(
+        finding.assumption,
+        finding.verdict,
+        words.either(f"assumption.{finding.assumption}", finding.assumption.replace("_", " ")),
+        words(f"verdict.{finding.verdict}"),
+        sentence(words, finding),
+        remedy(words, finding),
+        figure,
+    )
+
+
+def sentence(words: Words, finding: Finding) -> str:
+    """What was found, in the reader's language where that language has it, else in the check's own English."""
+    return _said(words, "finding", finding, finding.sentence)
+
+
+def remedy(words: Words, finding: Finding) -> str:
+    """What to do about it, likewise."""
+    return _said(words, "remedy", finding, finding.remedy)
+
+
+def _said(words: Words, kind: str, finding: Finding, otherwise: str) -> str:
+    key = f"{kind}.{finding.words_key}"
+    if key not in words:
+        return otherwise
+    try:
+        return words(key, **_shown(finding.words_values))
+    except (KeyError, IndexError):
+        return otherwise
+
+
+_SHARES = ("share", "visible_share", "share_bound", "decay", "period_shift")
+
+
+def _shown(values: Any) -> dict[str, str]:
+    """words_values as texts: `…_rad` also as `…_deg` and `…_mrad`, shares also as `…_percent`."""
+    shown: dict[str, str] = {}
+    for key, found in values.items():
+        if not isinstance(found, int | float) or isinstance(found, bool):
+            shown[key] = str(found)
+            continue
+        shown[key] = number(float(found), 3)
+        if key.endswith("_rad"):
+            shown[key.removesuffix("_rad") + "_deg"] = number(math.degrees(found), 3)
+            shown[key.removesuffix("_rad") + "_mrad"] = number(1e3 * found, 2)
+        if key in _SHARES or key.endswith(("_share", "_relative")):
+            shown[key + "_percent"] = percent(float(found))
+    return shown
+
+
+def _finding(material: Material, assumption: str) -> Finding | None:
+    return next((f for f in material.analysis.findings if f.assumption == assumption), None)
+
+
+# -- the details ------------------------------------------------------------------------------------------------------
+
+
+def _experiment(material: Material) -> Section:
+    from toolkit.report.figures.frame import frame
+
+    words, analysis = material.words, material.analysis
+    blocks: list[Block] = []
+    track = analysis.track
+    if track is not None:
+        ok = int(np.sum(track.ok))
+        sizes = {"width": track.meta.get("width_px", "–"), "height": track.meta.get("height_px", "–")}
+        share = percent(ok / max(1, track.frame.size))
+        text = words("text.experiment_video", frames=track.frame.size, ok=ok, percent=share, **sizes)
+    else:
+        text = words("text.experiment_series")
+    given = []
+    for key, found in (
+        ("mass", analysis.scene.pendulum.mass_kg),
+        ("length", analysis.scene.pendulum.length_m),
+        ("radius", analysis.scene.pendulum.bob_radius_m),
+        ("g", analysis.scene.environment.gravity_m_per_s2),
+    ):
+        if found is not None:
+            given.append(words(f"text.known_{key}", value=number(found, 6)))
+    known = words("text.known", list=", ".join(given))
+    if analysis.scene.pendulum.mass_kg is None and analysis.scene.pendulum.length_m is None:
+        known += " " + words("text.known_nothing")
+    blocks.append(Paragraph(f"{text} {known}"))
+    picture = frame(material)
+    if picture is not None:
+        blocks.append(picture)
+    return Section("experiment", words("section.experiment"), tuple(blocks))
+
+
+def _equation(material: Material) -> Section:
+    from toolkit.report.style import formula
+
+    words, best = material.words, material.best
+    blocks: list[Block] = [Paragraph(words("text.equation", model=model_name(words, best.model)))]
+    if best.equation_latex:
+        blocks.append(Equation(best.equation_latex, formula("equation", best.equation_latex)))
+    blocks.append(_parameter_table(words, best))
+    blocks.append(Paragraph(f"{words('text.conventions')} {words('text.start')}"))
+    return Section("equation", words("section.equation"), tuple(blocks))
+
+
+def _parameter_table(words: Words, result: FitResult) -> Table:
+    rows = []
+    for table, kind in ((result.parameters, None), (result.derived, "derived")):
+        for name, found in table.items():
+            if name in result.parameters and kind:
+                continue
+            state = kind or ("held" if found.fixed else "fitted")
+            shown = _value(found)
+            rows.append((_symbol(words, name), words.either(f"meaning.{name}", name), shown, words(f"kind.{state}")))
+    header = tuple(words(f"column.{c}") for c in ("symbol", "meaning", "value", "status"))
+    return Table("parameters", words("caption.parameters"), header, tuple(rows))
+
+
+def _value(found: Any) -> str:
+    """Value and uncertainty; angles in degrees too."""
+    text = with_uncertainty(found.value, found.stderr, found.unit)
+    if found.unit == "rad":
+        u = None if found.stderr is None else math.degrees(found.stderr)
+        text += f" = {with_uncertainty(math.degrees(found.value), u, 'deg', 4)}"
+    return text
+
+
+def _motion(material: Material) -> Section | None:
+    from toolkit.report.figures.motion import motion
+    from toolkit.report.figures.portrait import portrait
+
+    return _pictures(material, "motion", (motion, portrait))
+
+
+def _residuals(material: Material) -> Section | None:
+    from toolkit.report.figures.residuals import residuals
+    from toolkit.report.figures.spectrum import spectrum
+
+    return _pictures(material, "residuals", (residuals, spectrum), material.words("text.residuals"))
+
+
+def _pictures(material: Material, key: str, makers: tuple[Any, ...], text: str = "") -> Section | None:
+    drawn = [figure for make in makers if (figure := make(material)) is not None]
+    if not drawn:
+        return None
+    blocks: list[Block] = [Paragraph(text)] if text else []
+    return Section(key, material.words(f"section.{key}"), (*blocks, *drawn))
+
+
+def _models(material: Material) -> Section:
+    from toolkit.report.figures.contours import contours
+
+    words, fits = material.words, material.analysis.fits
+    good = [r for r in fits.values() if r.success and math.isfinite(r.aic)]
+    aic = min((r.aic for r in good), default=math.nan)
+    bic = min((r.bic for r in good), default=math.nan)
+    rows = []
+    for name, result in fits.items():
+        if result.success:
+            rms = number(1e3 * float(np.sqrt(np.mean(np.square(result.residuals_rad)))), 3)
+            numbers = (number(result.reduced_chi2, 3), number(result.aic - aic, 3), number(result.bic - bic, 3), rms)
+            rows.append((model_name(words, name), str(len(result.free)), *numbers, _drag_answer(material, result)))
+        else:
+            rows.append((model_name(words, name), str(len(result.free)), "–", "–", "–", "–", words("kind.failed")))
+    header = tuple(
+        words(f"column.{c}") for c in ("model", "free", "reduced_chi2", "delta_aic", "delta_bic", "rms", "drag")
+    )
+    mark = list(fits).index(material.analysis.preferred)
+    blocks: list[Block] = [
+        Paragraph(words("text.models")),
+        Table("ladder", words("caption.ladder"), header, tuple(rows), mark),
+    ]
+    picture = contours(material)
+    if picture is not None:
+        blocks.append(picture)
+    return Section("models", words("section.models"), tuple(blocks))
+
+
+def _budget(material: Material) -> Section | None:
+    return None
+
+
+def _findings(material: Material) -> Section | None:
+    words = material.words
+    others = [f for f in material.analysis.findings if f.assumption not in MAIN]
+    if not others:
+        return None
+    rows = []
+    for finding in others:
+        card = _card(words, finding, None)
+        text = f"{card.sentence} {card.remedy[:1].upper()}{card.remedy[1:]}".strip()
+        rows.append((card.title, card.label, text))
+    header = tuple(words(f"column.{c}") for c in ("parameter", "verdict", "finding"))
+    return Section(
+        "findings", words("section.findings"), (Table("checks", words("caption.checks"), header, tuple(rows)),)
+    )
+
+
+def _cost(material: Material) -> Section:
+    words = material.words
+    rows = tuple(
+        (
+            model_name(words, name),
+            result.method or "–",
+            number(result.cpu_s, 2),
+            words("kind.converged" if result.success else "kind.failed"),
+        )
+        for name, result in material.analysis.fits.items()
+    )
+    header = tuple(words(f"column.{c}") for c in ("model", "solution", "cpu", "status"))
+    return Section(
+        "cost",
+        words("section.cost"),
+        (Paragraph(words("text.cost")), Table("cost", words("caption.cost"), header, rows)),
+    )
+
+
+def _methods(material: Material) -> Section:
+    words, meta = material.words, material.analysis.series.meta
+    log = tuple(str(line) for line in meta.get("log", ()))
+    blocks: list[Block] = [Paragraph("" if log else words("text.no_log"), log)]
+    notes = [str(line) for line in meta.get("warnings", ())]
+    notes += [f"{w[:1].upper()}{w[1:]}" for w in material.best.warnings]
+    if notes:
+        blocks.append(Paragraph(words("text.warnings"), tuple(dict.fromkeys(notes))))
+    return Section("methods", words("section.methods"), tuple(blocks))
+
+
+def _references(material: Material) -> Section:
+    words, fits = material.words, material.analysis.fits
+    used = []
+    if PAPER in fits:
+        used.append("paper")
+    if any(name.startswith("full") for name in fits):
+        used.append("full_sine")
+    if any("quadratic" in name for name in fits):
+        used.append("quadratic")
+    if any("coulomb" in name for name in fits):
+        used.append("friction")
+    used += ["gum", "lmfit"]
+    kind = str(material.analysis.series.meta.get("format", "")).lower()
+    used += [key for key in ("tracker", "phyphox") if key in kind]
+    items = tuple(words(f"reference.{key}") for key in used)
+    return Section("references", words("section.references"), (Paragraph(words("text.references"), items),))
+
+
+def _sheets(material: Material) -> dict[str, dict[str, Any]]:
+    """Numbers for a spreadsheet: the series with model and residuals, all parameters of all fits, the ladder."""
+    series, best = material.analysis.series, material.best
+    data: dict[str, Any] = {"t_s": series.t_s, "theta_rad": series.theta_rad}
+    if series.sigma_theta_rad is not None:
+        data["sigma_theta_rad"] = series.sigma_theta_rad
+    if material.usable:
+        data |= {
+            "theta_model_rad": best.theta_rad,
+            "omega_model_rad_per_s": best.omega_rad_per_s,
+            "residual_rad": best.residuals_rad,
+        }
+    parameters: dict[str, list[Any]] = {k: [] for k in ("model", "parameter", "value", "stderr", "unit", "state")}
+    ladder: dict[str, list[Any]] = {
+        k: [] for k in ("model", "preferred", "success", "chi2", "dof", "reduced_chi2", "aic", "bic", "message")
+    }
+    for name, result in material.analysis.fits.items():
+        for table, state in ((result.parameters, ""), (result.derived, "derived")):
+            for key, found in table.items():
+                row = (name, key, found.value, found.stderr, found.unit, state or ("held" if found.fixed else "fitted"))
+                for column, cell in zip(parameters.values(), row):
+                    column.append(cell)
+        row2 = (
+            name,
+            name == material.analysis.preferred,
+            result.success,
+            result.chi2,
+            result.dof,
+            result.reduced_chi2,
+            result.aic,
+            result.bic,
+            result.message,
+        )
+        for column, cell2 in zip(ladder.values(), row2):
+            column.append(cell2)
+    findings: dict[str, list[Any]] = {k: [] for k in ("assumption", "verdict", "sentence", "remedy")}
+    for finding in material.analysis.findings:
+        for column, cell3 in zip(
+            findings.values(), (finding.assumption, finding.verdict, finding.sentence, finding.remedy)
+        ):
+            column.append(cell3)
+    return {"data": data, "parameters": parameters, "models": ladder, "findings": findings}
+
+
+def model_name(words: Words, name: str) -> str:
+    """A model's name in words; its own name where the language has none."""
+    return words.either(f"model.{name}", name.replace("_", " "))
+
+
+def _symbol(words: Words, name: str) -> str:
+    return words.either(f"symbol.{name}", name)
+
+
+__all__ = ["build", "facts", "lead", "model_name", "remedy", "sentence", "value", "verdicts"]

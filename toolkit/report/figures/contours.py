@@ -1,0 +1,92 @@
+"""Which parameters lean on each other: contours of the two most correlated, and all correlations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from toolkit.report.document import Figure
+from toolkit.report.material import Material
+from toolkit.report.numbers import bare
+from toolkit.report.style import BEST_MODEL, INK, draw
+
+_DRAGS = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
+
+
+def contours(material: Material) -> Figure | None:
+    """1σ and 2σ contours (39 % and 86 %) of two parameters of the richest model, and its correlation matrix."""
+    fits = [r for r in material.analysis.fits.values() if r.success and _covariance(r) is not None and len(r.free) >= 2]
+    if not fits:
+        return None
+    result = max(fits, key=lambda r: (sum(n in _DRAGS for n in r.free), r is material.best))
+    if (
+        result is not material.best
+        and _covariance(material.best) is not None
+        and sum(n in _DRAGS for n in material.best.free) >= 2
+    ):
+        result = material.best
+    words = material.words
+    covariance = _covariance(result)
+    assert covariance is not None
+    sigma = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(sigma, sigma)
+    first, second = _pair(result.free, correlation)
+    labels = [_label(words, name) for name in result.free]
+    values = np.array([result.parameters[name].value for name in result.free])
+    units = [result.parameters[name].unit for name in result.free]
+
+    def paint(figure: Any) -> None:
+        left, right = figure.subplots(1, 2, width_ratios=(1.15, 1))
+        turn = np.linspace(0, 2 * np.pi, 181)
+        root = np.linalg.cholesky(covariance[np.ix_([first, second], [first, second])] + 0.0)
+        for k, alpha in ((2, 0.18), (1, 0.35)):
+            x, y = k * root @ np.vstack([np.cos(turn), np.sin(turn)])
+            left.fill(values[first] + x, values[second] + y, color=BEST_MODEL, alpha=alpha, linewidth=0)
+        left.plot(values[first], values[second], "+", color=INK, markersize=6)
+        for axis, k in ((left.set_xlabel, first), (left.set_ylabel, second)):
+            axis(f"{labels[k]} ({_unit(units[k])})" if _unit(units[k]) else labels[k])
+        left.ticklabel_format(useOffset=False)
+        left.locator_params(nbins=5)
+        right.grid(False)
+        right.imshow(np.abs(correlation), cmap="Greys", vmin=0, vmax=1.6, aspect="auto")
+        for i in range(len(labels)):
+            for j in range(len(labels)):
+                right.text(
+                    j, i, f"{correlation[i, j]:.2f}".replace("-", "−"), ha="center", va="center", fontsize=7, color=INK
+                )
+        right.set_xticks(range(len(labels)), labels, rotation=35, ha="right")
+        right.set_yticks(range(len(labels)), labels)
+        for side in right.spines.values():
+            side.set_visible(False)
+
+    data = {
+        "parameter": np.array(result.free),
+        **{f"correlation_{n}": correlation[i] for i, n in enumerate(result.free)},
+    }
+    model = words.either(f"model.{result.model}", result.model)
+    return Figure("contours", words("caption.contours", model=model), draw("contours", words.lang, 2.7, paint), data)
+
+
+def _covariance(result: Any) -> np.ndarray | None:
+    c = np.asarray(result.covariance, dtype=float)
+    n = len(result.free)
+    good = c.shape == (n, n) and n and np.all(np.isfinite(c)) and np.all(np.diag(c) > 0)
+    return c if good and np.all(np.linalg.eigvalsh(c / np.sqrt(np.outer(np.diag(c), np.diag(c)))) > 0) else None
+
+
+def _pair(names: tuple[str, ...], correlation: np.ndarray) -> tuple[int, int]:
+    drags = [i for i, name in enumerate(names) if name in _DRAGS]
+    if len(drags) >= 2:
+        return drags[0], drags[1]
+    off = np.abs(correlation - np.eye(len(names)))
+    i, j = np.unravel_index(int(off.argmax()), off.shape)
+    return int(min(i, j)), int(max(i, j))
+
+
+def _label(words: Any, name: str) -> str:
+    return bare(words.either(f"symbol.{name}", name)).replace("_0", "₀").replace("_", " ")
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit.replace("1/s^2", "1/s²")

@@ -1,0 +1,63 @@
+"""Period against amplitude with the theory curve: the picture of the small-angle verdict."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from toolkit.report.document import Figure
+from toolkit.report.material import Material, binned, period_ratio, value
+from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, draw
+
+
+def period(material: Material, width_in: float = 3.35, height_in: float = 2.5) -> Figure | None:
+    """Measured period of each swing against its amplitude, the pendulum's own curve, and the small-angle line."""
+    cycles = material.cycles
+    small = value(material.best, "T0")
+    if cycles is None or small is None:
+        return None
+    words = material.words
+    threshold = threshold_rad(material)
+    widest = float(cycles.amplitude_rad.max()) * 1.05
+    grid = np.linspace(0, min(widest, 3.1), 200)
+    theory = small * period_ratio(grid)
+
+    def paint(figure: Any) -> None:
+        axis = figure.subplots()
+        degrees = np.degrees(cycles.amplitude_rad)
+        many = degrees.size > 60
+        axis.plot(
+            degrees, cycles.period_s, "o", color=DATA, alpha=0.35 if many else 1.0, label=words("figure.one_swing")
+        )
+        if many:
+            at, mean, error = binned(degrees, cycles.period_s, 16)
+            axis.errorbar(
+                at, mean, error, fmt="s", color=INK, markersize=3, elinewidth=0.8, label=words("figure.mean_of_swings")
+            )
+        axis.plot(np.degrees(grid), theory, color=BEST_MODEL, label=words("figure.full_sine"))
+        axis.axhline(small, color=PAPER_MODEL, linestyle="--", label=words("figure.small_angle"))
+        if threshold is not None and threshold < widest:
+            axis.axvspan(0, np.degrees(threshold), color=PAPER_MODEL, alpha=0.10, linewidth=0)
+        low, high = np.percentile(cycles.period_s, [1, 99])
+        low, high = min(low, small), max(high, float(theory[-1]))
+        axis.set_ylim(low - 0.08 * (high - low), high + 0.25 * (high - low))
+        axis.set_xlim(0, np.degrees(widest))
+        axis.set_xlabel(words("figure.amplitude_deg"))
+        axis.set_ylabel(words("figure.period_s"))
+        axis.ticklabel_format(axis="y", useOffset=False)
+        axis.legend(loc="upper left")
+
+    data = {"amplitude_rad": cycles.amplitude_rad, "period_s": cycles.period_s}
+    if cycles.period_sigma_s is not None:
+        data["sigma_period_s"] = cycles.period_sigma_s
+    return Figure("period", words("caption.period"), draw("period", words.lang, height_in, paint, width_in), data)
+
+
+def threshold_rad(material: Material) -> float | None:
+    """Up to which amplitude the small-angle formula serves, as the finding says."""
+    for finding in material.analysis.findings:
+        if finding.assumption == "small_angle":
+            found = finding.where.get("amplitude_above_rad")
+            return None if found is None else float(found)
+    return None

@@ -1,0 +1,262 @@
+"""What the report's figures and tables are made of, computed once from an Analysis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolkit.report.words import Words
+
+if TYPE_CHECKING:
+    from toolkit.analyse import Analysis
+    from toolkit.fit import FitResult, FittedParameter
+
+PAPER = "small_angle_linear_drag"
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """One entry a full swing: middle time, amplitude and period, each with its standard uncertainty where known."""
+
+    t_s: np.ndarray
+    amplitude_rad: np.ndarray
+    amplitude_sigma_rad: np.ndarray | None
+    period_s: np.ndarray
+    period_sigma_s: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A model on a dense grid: θ, θ̇, tension over weight, and the standard uncertainty of each from the fit."""
+
+    t_s: np.ndarray
+    theta_rad: np.ndarray
+    omega_rad_per_s: np.ndarray
+    tension: np.ndarray
+    theta_u: np.ndarray | None
+    omega_u: np.ndarray | None
+    tension_u: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Material:
+    """The analysis with what follows from it; arrays are computed when a figure first asks."""
+
+    analysis: Analysis
+    words: Words
+
+    @property
+    def t(self) -> np.ndarray:
+        """Times of the points, s."""
+        return self.analysis.series.t_s
+
+    @property
+    def theta(self) -> np.ndarray:
+        """Measured angles, rad."""
+        return self.analysis.series.theta_rad
+
+    @property
+    def best(self) -> FitResult:
+        """The preferred model's fit."""
+        return self.analysis.fits[self.analysis.preferred]
+
+    @property
+    def paper(self) -> FitResult | None:
+        """The small-angle, linear-drag fit, where it was made."""
+        return self.analysis.fits.get(PAPER)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the preferred fit gave a motion to draw."""
+        return bool(
+            self.best.success and np.all(np.isfinite(self.best.theta_rad)) and len(self.best.theta_rad) == self.t.size
+        )
+
+    @cached_property
+    def offset(self) -> float:
+        """The fitted zero of the angle, rad."""
+        return value(self.best, "theta_offset") or 0.0
+
+    @cached_property
+    def omega_g(self) -> float:
+        """√(g/ℓ) in rad/s, from the fit; NaN where there is none."""
+        for name in ("omega_g",):
+            found = value(self.best, name)
+            if found:
+                return found
+        period = value(self.best, "T0")
+        if period:
+            return 2 * math.pi / period
+        length = value(self.best, "length")
+        g = self.analysis.scene.environment.gravity_m_per_s2
+        return math.sqrt(g / length) if length else math.nan
+
+    @cached_property
+    def cycles(self) -> Cycles | None:
+        """Amplitude and period of each swing, None where there are fewer than three."""
+        return find_cycles(self.t, self.theta - self.offset, self.analysis.series.sigma_theta_rad)
+
+    @cached_property
+    def sigma(self) -> float:
+        """Scatter of a point about the preferred model, rad."""
+        sigma = self.best.noise.get("sigma_rad")
+        if sigma:
+            return float(sigma)
+        return float(np.std(self.best.residuals_rad)) if self.usable else math.nan
+
+    def problem(self, result: FitResult) -> Any | None:
+        """What was solved for `result`, to evaluate its motion at other times; None where that is not possible."""
+        from toolkit.problem import pose
+
+        try:
+            return pose(self.analysis.series, self.analysis.scene, result.model)
+        except Exception:  # a fit from elsewhere: its figures are drawn at the measured times
+            return None
+
+    def curve(self, result: FitResult, t_s: np.ndarray) -> Curve:
+        """The model of `result` at `t_s` with the band that its covariance gives."""
+        values = {name: p.value for name, p in result.parameters.items()}
+        problem = self.problem(result)
+        if problem is None:
+            at = np.clip(np.searchsorted(self.t, t_s), 0, self.t.size - 1)
+            theta, omega = result.theta_rad[at], result.omega_rad_per_s[at]
+            return Curve(self.t[at], theta, omega, self._tension(theta, omega), None, None, None)
+        names = tuple(result.free)
+        motion = problem.motion(values, t_s - problem.shift_s, names)
+        scale = 1 + values.get("angle_scale", 0.0)
+        d_theta, d_omega = motion.d_theta.copy(), motion.d_omega
+        d_tension = -np.sin(motion.theta)[:, None] * d_theta + 2 * (motion.omega / self.omega_g**2)[:, None] * d_omega
+        if "theta_offset" in names:
+            d_theta[:, names.index("theta_offset")] += 1.0
+        covariance = np.asarray(result.covariance, dtype=float)
+        known = covariance.shape == (len(names), len(names)) and np.all(np.isfinite(covariance))
+
+        def band(by: np.ndarray) -> np.ndarray | None:
+            return np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", by, covariance, by), 0)) if known else None
+
+        theta = scale * motion.theta + values.get("theta_offset", 0.0)
+        tension = self._tension(motion.theta, motion.omega)
+        return Curve(t_s, theta, motion.omega, tension, band(d_theta), band(d_omega), band(d_tension))
+
+    def _tension(self, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
+        """Tension of the string over the bob's weight: cos θ + θ̇²/ω_g²."""
+        return np.cos(theta) + (omega / self.omega_g) ** 2
+
+    @cached_property
+    def measured_omega(self) -> np.ndarray:
+        """θ̇ from the measured angles by central differences, rad/s (for pictures)."""
+        return np.gradient(self.theta, self.t) if self.t.size > 2 else np.zeros_like(self.t)
+
+    @cached_property
+    def phase(self) -> np.ndarray:
+        """Phase of the swing at each point, rad, 0 at the right turning point."""
+        theta = self.best.theta_rad - self.offset
+        return np.mod(np.arctan2(-self.best.omega_rad_per_s / self.omega_g, theta), 2 * np.pi)
+
+
+def value(result: FitResult, name: str) -> float | None:
+    """A fitted or derived number, None where the model has none."""
+    found = parameter(result, name)
+    return None if found is None or not math.isfinite(found.value) else float(found.value)
+
+
+def parameter(result: FitResult, name: str) -> FittedParameter | None:
+    """A fitted or derived parameter by name."""
+    return result.parameters.get(name) or result.derived.get(name)
+
+
+def find_cycles(t: np.ndarray, theta: np.ndarray, sigma: np.ndarray | None) -> Cycles | None:
+    """Amplitude and period of each full swing, from zero crossings (line fits) and turning points (parabolas)."""
+    crossings, crossing_u = _crossings(t, theta)
+    if crossings.size < 4:
+        return None
+    half_tops = []
+    for left, right in zip(crossings[:-1], crossings[1:]):
+        inside = (t >= left) & (t <= right)
+        half_tops.append(_top(t[inside], theta[inside]))
+    tops = np.array(half_tops)
+    amplitude = 0.25 * (np.abs(tops[:-2]) + 2 * np.abs(tops[1:-1]) + np.abs(tops[2:]))
+    period = crossings[3:] - crossings[1:-2]  # from crossing to crossing of the same kind, about the middle top
+    middle = 0.5 * (crossings[3:] + crossings[1:-2])
+    amplitude = amplitude[: period.size]
+    good = np.isfinite(amplitude) & (amplitude > 0)
+    typical = np.median(period[good]) if good.any() else math.nan
+    good &= (period < 1.5 * typical) & (period > 0.6 * typical)  # a gap in the record is no long swing
+    if np.sum(good) < 3:
+        return None
+    u = np.hypot(crossing_u[3:], crossing_u[1:-2])
+    return Cycles(middle[good], amplitude[good], None, period[good], u[good])
+
+
+def _crossings(t: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times at which θ passes zero, with the uncertainty that a line through the points nearby leaves."""
+    step = float(np.median(np.diff(t))) if t.size > 1 else 0.0
+    at = np.flatnonzero(np.signbit(theta[1:]) != np.signbit(theta[:-1]))
+    if at.size < 2:
+        return np.array([]), np.array([])
+    half = float(np.median(np.diff(t[at])))
+    at = np.array([i for k, i in enumerate(at) if k == 0 or t[i] - t[at[k - 1]] > 0.3 * half])
+    reach = max(1, int(0.08 * half / step)) if step else 1
+    times, sigmas = [], []
+    for i in at:
+        low, high = max(0, i + 1 - reach), min(t.size, i + 1 + reach)
+        if t[i + 1] - t[i] > 3 * step + 1e-12:
+            continue
+        x, y = t[low:high] - t[i], theta[low:high]
+        slope, level = np.polyfit(x, y, 1)
+        if slope == 0 or abs(level / slope) > half:
+            continue
+        rest = y - slope * x - level
+        scatter = math.sqrt(float(rest @ rest) / max(1, x.size - 2))
+        times.append(t[i] - level / slope)
+        sigmas.append(scatter / abs(slope) / math.sqrt(x.size))
+    return np.array(times), np.array(sigmas)
+
+
+def _top(t: np.ndarray, theta: np.ndarray) -> float:
+    """Signed height of one turning point, from a parabola through the highest third of a half swing."""
+    if t.size < 3:
+        return math.nan
+    k = int(np.argmax(np.abs(theta)))
+    high = np.abs(theta) >= 0.85 * abs(theta[k])
+    if np.sum(high) < 4:
+        return float(theta[k])
+    x = t[high] - t[k]
+    spread = float(np.ptp(x)) or 1.0
+    a, b, c = np.polyfit(x / spread, theta[high], 2)
+    return float(c - b * b / (4 * a)) if a * theta[k] < 0 else float(theta[k])
+
+
+def thinned(n: int, limit: int) -> np.ndarray:
+    """Indices of at most `limit` of `n` points, spread evenly but not in step with the swing (golden ratio)."""
+    if n <= limit:
+        return np.arange(n)
+    steps = np.arange(limit)
+    jitter = np.mod(steps * 0.618033988749895, 1.0)
+    return np.unique(np.minimum(((steps + jitter) * n / limit).astype(int), n - 1))
+
+
+def binned(x: np.ndarray, y: np.ndarray, bins: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean of y in equal bins of x with the standard error of each mean: (centre, mean, error)."""
+    if x.size < 2 or np.ptp(x) == 0:
+        return np.array([]), np.array([]), np.array([])
+    edges = np.linspace(x.min(), x.max(), bins + 1)
+    k = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
+    count = np.bincount(k, minlength=bins)
+    total, squares = np.bincount(k, y, bins), np.bincount(k, y * y, bins)
+    full = count >= 3
+    mean = total[full] / count[full]
+    spread = np.sqrt(np.maximum(squares[full] / count[full] - mean**2, 0) / (count[full] - 1))
+    return 0.5 * (edges[1:] + edges[:-1])[full], mean, spread
+
+
+def period_ratio(amplitude_rad: np.ndarray) -> np.ndarray:
+    """T/T₀ of the undamped pendulum at each amplitude < π: 1/agm(1, cos(A/2))."""
+    a, b = np.ones_like(amplitude_rad), np.cos(np.minimum(np.abs(amplitude_rad), np.pi - 1e-9) / 2)
+    for _ in range(8):
+        a, b = 0.5 * (a + b), np.sqrt(a * b)
+    return 1 / a

@@ -1,0 +1,31 @@
+"""The report's essentials as plain lines for a terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING
+
+from toolkit.report.numbers import bare
+
+if TYPE_CHECKING:
+    from toolkit.analyse import Analysis
+
+
+def summary_lines(analysis: Analysis, lang: str = "en") -> list[str]:
+    """What was measured, the answers, and the verdicts, one line each (long ones wrapped)."""
+    from toolkit.report.build import MAIN, facts, lead, remedy, sentence
+    from toolkit.report.material import Material
+    from toolkit.report.words import load_words
+
+    words = load_words(lang)
+    material = Material(analysis, words)
+    lines = [bare(lead(material))]
+    for fact in facts(material):
+        remark = f"  ({bare(fact.remark)})" if fact.remark else ""
+        lines.append(f"{bare(fact.question)}  {bare(fact.answer)}{remark}")
+    for finding in analysis.findings:
+        if finding.assumption in MAIN:
+            title = words.either(f"assumption.{finding.assumption}", finding.assumption)
+            text = f"{bare(title)}: {words(f'verdict.{finding.verdict}')}. {bare(sentence(words, finding))} {bare(remedy(words, finding))}"
+            lines += textwrap.wrap(text, 110, subsequent_indent="  ")
+    return lines
