@@ -48,7 +48,7 @@ def write_overlay(
     video = open_video(video_path)
     row_of = {int(frame): row for row, frame in enumerate(track.frame)}
     scale = min(1.0, _LARGEST_PX / max(video.width_px, video.height_px))
-    size = tuple(max(2, math.ceil(side * scale / 2) * 2) for side in (video.width_px, video.height_px))  # even
+    size = (_even(video.width_px * scale), _even(video.height_px * scale))
     rate = _rate(track.t_s)
     written = 0
     with (
@@ -78,6 +78,10 @@ def write_overlay(
     return out_path
 
 
+def _even(side: float) -> int:
+    return max(2, math.ceil(side / 2) * 2)
+
+
 def _rate(t_s: np.ndarray) -> Fraction:
     steps = np.diff(t_s)
     step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1 / 30
@@ -105,7 +109,7 @@ def _model_px(track: Track, theta_rad: np.ndarray | None) -> np.ndarray | None:
     return np.array(track.pivot_px) + length * np.stack([np.sin(theta + vertical), np.cos(theta + vertical)], axis=1)
 
 
-def _fitted(picture: np.ndarray, scale: float, size: tuple[int, ...]) -> np.ndarray:
+def _fitted(picture: np.ndarray, scale: float, size: tuple[int, int]) -> np.ndarray:
     """A copy scaled down to fit, its last row and column repeated where an even size needs it."""
     import cv2
 
