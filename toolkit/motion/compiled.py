@@ -75,7 +75,9 @@ def jet_address(module: ModuleType) -> int:
 
     pointer = types.CPointer(types.float64)
     signature = types.void(pointer, pointer, pointer, pointer, types.int64)
-    module.compiled_jet = numba.cfunc(signature, cache=True, fastmath={"contract", "reassoc", "nsz"})(module.jet)  # type: ignore[attr-defined]
+    module.compiled_jet = numba.cfunc(
+        signature, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"}
+    )(module.jet)  # type: ignore[attr-defined]
     address: int = module.compiled_jet.address
     return address
 
@@ -87,6 +89,6 @@ def terms_address(module: ModuleType) -> int:
 
     pointer = types.CPointer(types.float64)
     signature = types.void(pointer, pointer, pointer)
-    module.compiled_terms = numba.cfunc(signature, cache=True)(module.terms)  # type: ignore[attr-defined]
+    module.compiled_terms = numba.cfunc(signature, cache=True, error_model="numpy")(module.terms)  # type: ignore[attr-defined]
     address: int = module.compiled_terms.address
     return address

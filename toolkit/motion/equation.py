@@ -29,7 +29,7 @@ from toolkit.registry import did_you_mean
 from toolkit.trajectory import Event, SolveCost
 
 START = ("theta0_rad", "omega0_rad_per_s")
-_VERSION = 1  # of the generated code: a change here makes old caches unused
+_VERSION = 2  # of the generated code: a change here makes old caches unused
 
 
 @dataclass(frozen=True)
@@ -269,7 +269,15 @@ class Equation:
         if not accuracy_rad > 0:
             raise UsageError(f"accuracy_rad must be positive, got {accuracy_rad}")
         p = self._values(parameters)
-        return self._solve_taylor(p, theta0_rad, omega0_rad_per_s, t, accuracy_rad, tuple(sensitivities), start_s)
+        names = tuple(sensitivities)
+        if t.size == 0:
+            return Solution(
+                t, t, t, np.empty((0, len(names))), np.empty((0, len(names))), "nothing to do", SolveCost(), 0.0
+            )
+        exact = self._solve_exactly(p, theta0_rad, omega0_rad_per_s, t, accuracy_rad, names, start_s)
+        if exact is not None:
+            return exact
+        return self._integrate(p, theta0_rad, omega0_rad_per_s, t, accuracy_rad, names, start_s)
 
     def _layout(self, sensitivities: tuple[str, ...]) -> tuple[Any, ...]:
         """Where the rows of the coefficient matrix lie for these sensitivities; made once."""
@@ -299,15 +307,101 @@ class Equation:
         self._memory[sensitivities] = made
         return made
 
-    def _solve_taylor(
+    def _reduced(self, p: tuple[float, ...]) -> tuple[complex, ...]:
+        """(restoring, damping, drive, f, phase) of  θ'' = −restoring·sin θ − damping·θ' + drive·cos(2πft + phase).
+
+        Only for effects declared linear; p may be complex (for derivatives).
+        """
+        values = dict(zip(self.parameters, p))
+        values.setdefault("mass_kg", 1.0)
+
+        def torque(theta: float, omega: float) -> tuple[complex, complex, list[Any]]:
+            state = {"t": 0.0, "theta": theta, "omega": omega}
+            seen = symbols(number_functions(), state, values, self.effects, self.small_angle, self.formula_text)
+            total, inertia, _, harmonics = self._sum(seen)
+            return total, inertia, harmonics
+
+        deflected, inertia, harmonics = torque(1.0, 0.0)
+        restoring = -deflected / inertia / (1.0 if self.small_angle else math.sin(1.0))
+        damping = -torque(0.0, 1.0)[0] / inertia
+        if not harmonics:
+            return restoring, damping, 0.0, 0.0, 0.0
+        return restoring, damping, harmonics[0].amplitude / inertia, harmonics[0].f_hz, harmonics[0].phase_rad
+
+    def _solve_exactly(
+        self, p: tuple[float, ...], theta0: float, omega0: float, t: np.ndarray, accuracy: float,
+        sensitivities: tuple[str, ...], start_s: float,
+    ) -> Solution | None:  # fmt: skip
+        """The closed form of the linear equation, or the elliptic solution of the bare pendulum; None where neither fits."""
+        if not self._may_be_exact:
+            return None
+        began = time.process_time()
+        restoring, damping, drive, f_hz, phase = (float(v.real) for v in self._reduced(p))
+        if not restoring > 0:
+            return None
+        rate = math.sqrt(restoring)
+        if not self.small_angle:
+            if damping != 0 or drive != 0 or sensitivities:
+                return None
+            from toolkit.motion.elliptic import solve_pendulum
+
+            exact = solve_pendulum(t - start_s, theta0, omega0, rate)
+            none = np.empty((t.size, 0))
+            cost = SolveCost(time.process_time() - began)
+            error = 4e-16 * (abs(theta0) + math.pi + abs(float(exact.theta_rad[-1])))
+            return Solution(
+                t, exact.theta_rad, exact.omega_rad_per_s, none, none, "exact: elliptic functions", cost, error
+            )
+        from toolkit.motion.closed_form import solve_linear
+
+        turn = 2 * math.pi * f_hz
+        inputs = ("alpha_per_s", "omega_g_rad_per_s", "drive_rad_per_s2", "omega_f_rad_per_s", "phase_rad")
+        wanted = (*START, *inputs) if sensitivities else ()
+        solved = solve_linear(
+            t - start_s, theta0, omega0, damping / 2, rate, drive, turn, phase + turn * start_s, derivatives=wanted
+        )
+        chain = np.zeros((len(wanted), len(sensitivities)))
+        for column, name in enumerate(sensitivities):
+            if name in START:
+                chain[START.index(name), column] = 1.0
+            elif name in self.parameters:
+                step = 1e-30  # complex step: the derivative to the last digit
+                moved = [v + 1j * step if n == name else v for n, v in zip(self.parameters, p)]
+                k, d, a, f, ph = (complex(v).imag / step for v in self._reduced(tuple(moved)))
+                by_turn = 2 * math.pi * f
+                chain[2:, column] = d / 2, k / (2 * rate), a, by_turn, ph + by_turn * start_s
+            elif name not in SCENE_SYMBOLS:
+                raise UsageError(
+                    f"no parameter {name!r} in this equation{did_you_mean(name, [*self.parameters, *START])}"
+                )
+        cost = SolveCost(time.process_time() - began)
+        error = 1e-15 * (1 + float(np.abs(solved.theta_rad).max()))
+        shape = (t.size, len(sensitivities))
+        by_theta = solved.d_theta @ chain if sensitivities else np.empty(shape)
+        by_omega = solved.d_omega @ chain if sensitivities else np.empty(shape)
+        method = "exact: closed form of the linear equation"
+        return Solution(t, solved.theta_rad, solved.omega_rad_per_s, by_theta, by_omega, method, cost, error)
+
+    @cached_property
+    def _may_be_exact(self) -> bool:
+        kinds = [e for e in self.effects if e.name != "slack_string"]
+        if self.is_linear:
+            return True
+        return not self.small_angle and all(e.linear and e.name not in ("linear_drag", "cosine_drive") for e in kinds)
+
+    @cached_property
+    def _terms(self) -> tuple[int, float]:
+        from toolkit.motion import compiled
+
+        began = time.process_time()
+        address = compiled.terms_address(self.code)
+        return address, time.process_time() - began
+
+    def _integrate(
         self, p: tuple[float, ...], theta0: float, omega0: float, t: np.ndarray, accuracy: float,
         sensitivities: tuple[str, ...], start_s: float,
     ) -> Solution:  # fmt: skip
-        from toolkit.motion import taylor
-
         code = self.code
-        address, compile_s = self._jet
-        began = time.process_time()
         scale = 2.0 ** round(0.5 * math.log2(p[0] / p[1]))  # p: length_m, g_m_per_s2, …
         layout, columns, take, lengths = self._layout(sensitivities)
         coefficients = code.coefficients(p, scale)
@@ -315,7 +409,6 @@ class Equation:
         if take:
             partials = code.partials(p, scale)
             entries += tuple([partials[i] for i in take])
-        q, values = np.array(coefficients or (0.0,)), np.array(entries or (0.0,))
         k = len(sensitivities)
         initial = np.zeros((k, 2))
         for a, name in enumerate(sensitivities):
@@ -323,45 +416,118 @@ class Equation:
                 initial[a, 0] = 1.0
             elif name == START[1]:
                 initial[a, 1] = scale
-        tau = t / scale
-        out = np.empty((2 + 2 * k, t.size))
-        events = np.zeros((64, 3))
-        rate = code.fastest_rate(p, scale)
-        span = (tau[-1] - start_s / scale) if t.size else 0.0
-        tolerance = max(0.1 * accuracy / (1.0 + span * (1.0 + 0.05 * span)), 1e-17)
-        evaluations = steps = 0
+        task = _Task(
+            np.array(coefficients or (0.0,)), layout, columns, np.array(entries or (0.0,)), lengths,
+            code.fastest_rate(p, scale), float(theta0), float(omega0) * scale, start_s / scale, t / scale,
+            initial, np.empty((2 + 2 * k, t.size)), np.zeros((64, 3)),
+        )  # fmt: skip
+        result = self._run_taylor(task, accuracy) if code.ANALYTIC else None
+        if result is None:
+            result = self._run_dop853(task, accuracy)
+        out, found = task.out, result.events
+        events = tuple(
+            Event(("stick", "slip")[int(e[0])], float(e[1] * scale), float(e[2])) for e in task.events[:found]
+        )
         warnings: tuple[str, ...] = ()
+        if result.error > accuracy:
+            text = f"asked for {accuracy:.1e} rad, the estimated error is {result.error:.1e} rad: the motion amplifies rounding"
+            warnings = (text,)
+        return Solution(
+            t, out[0], out[1] / scale, out[2 : 2 + k].T, out[2 + k :].T / scale, result.method, result.cost,
+            result.error, events, warnings,
+        )  # fmt: skip
+
+    def _run_taylor(self, task: _Task, accuracy: float) -> _Result | None:
+        """Taylor series; None where the motion meets a point at which a term has none."""
+        from toolkit.motion import taylor
+
+        code = self.code
+        address, compile_s = self._jet
+        began = time.process_time()
+        span = float(task.tau[-1]) - task.start
+        tolerance = max(0.1 * accuracy / (1.0 + span * (1.0 + 0.05 * span)), _FLOOR)
+        evaluations = steps = 0
         for _attempt in range(6):
             order = min(max(int(1.5 - 0.55 * math.log(tolerance)), 6), taylor.MAX_ORDER)
-            status, taken, n_events, error = taylor.integrate(
-                address, q, code.N_INNER, code.N_WORK, layout, columns, values, lengths, code.SWITCHES, code.HOLDS,
-                code.TIMED, rate, float(theta0), float(omega0) * scale, start_s / scale, tau, order, tolerance, 20_000_000,
-                initial, out, events, taylor.RECIPROCALS,
+            status, taken, found, error = taylor.integrate(
+                address, task.q, code.N_WORK, task.layout, task.columns, task.values, task.lengths, code.SWITCHES,
+                code.HOLDS, code.TIMED, task.rate, task.theta, task.w, task.start, task.tau, order, tolerance, _MOST_STEPS,
+                task.initial, task.out, task.events, taylor.RECIPROCALS,
             )  # fmt: skip
             steps += taken
             evaluations += taken * order
-            if status != taylor.DONE or error <= accuracy or tolerance <= 1e-17:
+            if status != taylor.DONE or error <= accuracy or tolerance <= _FLOOR:
                 break
-            tolerance = max(tolerance * 0.3 * accuracy / error, 1e-17)
+            tolerance = max(tolerance * 0.3 * accuracy / error, _FLOOR)
         if status == taylor.NOT_FINITE:
-            raise JobError("the motion grows without bound or meets a singularity; check the effects' parameters")
-        if status == taylor.TOO_MANY_STEPS:
-            raise JobError(
-                "the equation needs more than 20 million steps; shorten the time or soften the stiffest effect"
-            )
-        if error > accuracy:
-            warnings = (
-                f"asked for {accuracy:.1e} rad, the estimated error is {error:.1e} rad: the motion amplifies rounding",
-            )
-        found = tuple(
-            Event(("stick", "slip")[int(kind)], float(at * scale), float(theta))
-            for kind, at, theta in events[:n_events]
-        )
+            return None
+        _require_steps(status == taylor.TOO_MANY_STEPS)
         cost = SolveCost(time.process_time() - began, compile_s, evaluations, steps)
-        return Solution(
-            t, out[0], out[1] / scale, out[2 : 2 + k].T, out[2 + k :].T / scale, f"Taylor series of order {order}",
-            cost, error, found, warnings,
-        )  # fmt: skip
+        return _Result(error, f"Taylor series of order {order}", cost, found)
+
+    def _run_dop853(self, task: _Task, accuracy: float) -> _Result:
+        """Runge–Kutta of order 8."""
+        from toolkit.motion import dop853, dop853_table, taylor
+
+        code = self.code
+        address, compile_s = self._terms
+        began = time.process_time()
+        span = float(task.tau[-1]) - task.start
+        tolerance = max(0.1 * accuracy / (1.0 + 0.3 * span), _RK_FLOOR)
+        steps = 0
+        for _attempt in range(6):
+            status, taken, found, error = dop853.integrate(
+                address, task.q, code.N_BASIS, task.layout, task.columns, task.values, code.SWITCHES, code.HOLDS,
+                code.TIMED, task.rate, task.theta, task.w, task.start, task.tau, tolerance, _MOST_STEPS, task.initial,
+                task.out, task.events, dop853_table.A, dop853_table.NODES, dop853_table.E3, dop853_table.E5,
+                dop853_table.D, taylor.RECIPROCALS,
+            )  # fmt: skip
+            steps += taken
+            if status != dop853.DONE or error <= accuracy or tolerance <= _RK_FLOOR:
+                break
+            tolerance = max(tolerance * 0.3 * accuracy / error, _RK_FLOOR)
+        if status == dop853.NOT_FINITE:
+            raise JobError("the motion grows without bound or meets a singularity; check the effects' parameters")
+        _require_steps(status == dop853.TOO_MANY_STEPS)
+        cost = SolveCost(time.process_time() - began, compile_s, 12 * steps, steps)
+        return _Result(error, "Runge–Kutta DOP853", cost, found)
+
+
+_FLOOR, _RK_FLOOR, _MOST_STEPS = 1e-17, 1e-15, 20_000_000
+
+
+def _require_steps(too_many: bool) -> None:
+    if too_many:
+        raise JobError(
+            f"the equation needs more than {_MOST_STEPS} steps; shorten the time or soften the stiffest effect"
+        )
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What an integrator is given, in scaled time; `out` and `events` are filled by it."""
+
+    q: np.ndarray
+    layout: np.ndarray
+    columns: np.ndarray
+    values: np.ndarray
+    lengths: np.ndarray
+    rate: float
+    theta: float
+    w: float
+    start: float
+    tau: np.ndarray
+    initial: np.ndarray
+    out: np.ndarray
+    events: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Result:
+    error: float
+    method: str
+    cost: SolveCost
+    events: int
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 ROW = 32  # Taylor coefficients kept of each basis function
+_MOST_ROWS = 48  # a longer recurrence takes too long to compile: Runge–Kutta is then the better route
 
 
 class NotAnalytic(Exception):
@@ -86,6 +87,7 @@ class _Writer:
             jet = _Jet(self).function()
         except NotAnalytic:
             jet = ""
+            self.inner.clear()
         self.analytic = bool(jet)
         terms = self.terms()
         parts = [f'"""{self.header}"""', "import math", self.facts(), self.coefficients(), self.partials()]
@@ -211,6 +213,8 @@ class _Jet:
     def function(self) -> str:
         for i, function in enumerate(self.writer.basis):
             self._basis(function, 3 + i)
+            if self.count > _MOST_ROWS:
+                raise NotAnalytic
         lengths = [len(self.writer.inner)]
         force = self.writer.matrix[0]
         parts = [f"q[{lengths[0] + i}] * W[{(3 + column) * ROW} + k]" for i, column in enumerate(force)]

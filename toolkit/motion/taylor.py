@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from toolkit.motion.friction import held_until, leave_rest
 from toolkit.motion.generate import ROW
 from toolkit.motion.pointer import call_jet
 
@@ -102,13 +103,6 @@ def _turning_point(W: Any, n: int, h: float, sign: float) -> tuple[float, bool]:
 
 
 @njit(cache=True)
-def _force_at_rest(address: int, q: Any, s: Any, W: Any, R: Any, sign: float) -> float:
-    s[3] = sign
-    call_jet(address, q.ctypes.data, s.ctypes.data, W.ctypes.data, R.ctypes.data, 1)
-    return W[2 * ROW]
-
-
-@njit(cache=True)
 def _combine(W: Any, columns: Any, values: Any, first: int, last: int, n: int, out: Any, at: int) -> None:
     """A row of the coefficient matrix times the basis series."""
     for k in range(n):
@@ -145,7 +139,6 @@ def _variational(J: Any, lengths: Any, D: Any, at: int, F: Any, f_at: int, force
 def integrate(
     address: int,
     q: Any,
-    n_inner: int,
     n_work: int,
     layout: Any,  # (rows + 1,) where each matrix row starts in columns/values; rows: F, F_θ, F_w, F_τ, sensitivities
     columns: Any,
@@ -179,9 +172,8 @@ def integrate(
     error_theta, error_w, worst = 0.0, 0.0, 0.0
     n_events, steps, i = 0, 0, 0
     sign = 1.0 if w > 0.0 else -1.0
-    state = 0  # 0 moving, 1 just come to rest or starting at rest, 2 held
-    if switches and w == 0.0:
-        state = 1
+    resting = switches and w == 0.0
+    row = (columns[layout[0] : layout[1]], values[layout[0] : layout[1]])
     seed = 1
     for a in range(k_sens):
         D[2 * a * ROW] = sensitivity[a, 0]
@@ -198,68 +190,38 @@ def integrate(
         if steps >= max_steps:
             return TOO_MANY_STEPS, steps, n_events, worst
         s[0], s[1], s[2] = hi + lo, theta, w
-        if state == 1:  # at rest: which way, or held?
-            before = _force_at_rest(address, q, s, W, R, sign)
-            up, down = _force_at_rest(address, q, s, W, R, 1.0), _force_at_rest(address, q, s, W, R, -1.0)
-            if holds and up <= 0.0 and down >= 0.0:
-                state = 2
-                after = 0.0
-            else:
-                if up > 0.0:
-                    sign, after = 1.0, up
-                elif down < 0.0:
-                    sign, after = -1.0, down
-                else:
-                    after = 0.0
-                state = 0
-            if n_events > 0 or steps > 0:  # δw jumps by the ratio of the accelerations
-                ratio = after / before if before != 0.0 else 1.0
+        if resting:
+            held, sign, ratio = leave_rest(address, True, q, s, W, R, row, holds, sign)
+            if steps > 0:  # δw jumps by the ratio of the accelerations
                 for a in range(k_sens):
                     D[(2 * a + 1) * ROW] *= ratio
                 error_w *= ratio
-            if state == 2 and n_events < events.shape[0]:
-                events[n_events, 0], events[n_events, 1], events[n_events, 2] = STICK, hi + lo, theta
-                n_events += 1
-        if state == 2:  # held: find when the torque exceeds the friction
-            until = end
-            freed = False
-            if timed:
-                step = math.pi / 64.0 / rate
-                left = hi + lo
-                while left < end and not freed:
-                    right = min(left + step, end)
-                    for way in (1.0, -1.0):
-                        s[0] = right
-                        if not freed and way * _force_at_rest(address, q, s, W, R, way) > 0.0:
-                            low, high = left, right
-                            for _ in range(200):
-                                middle = 0.5 * (low + high)
-                                if middle <= low or middle >= high:
-                                    break
-                                s[0] = middle
-                                if way * _force_at_rest(address, q, s, W, R, way) > 0.0:
-                                    high = middle
-                                else:
-                                    low = middle
-                            until, sign, freed = high, way, True
-                    left = right
-                    steps += 1
-            while i < count and t[i] <= until:
-                out[0, i] = theta
-                out[1, i] = 0.0
+            resting = False
+            if held:
+                if n_events < events.shape[0]:
+                    events[n_events, 0], events[n_events, 1], events[n_events, 2] = STICK, hi + lo, theta
+                    n_events += 1
+                until, way = end, 0.0
+                if timed:
+                    until, way = held_until(address, True, q, s, W, R, row, rate, hi + lo, end)
+                while i < count and t[i] <= until:
+                    out[0, i] = theta
+                    out[1, i] = 0.0
+                    for a in range(k_sens):
+                        out[2 + a, i] = D[2 * a * ROW]
+                        out[2 + k_sens + a, i] = 0.0
+                    i += 1
                 for a in range(k_sens):
-                    out[2 + a, i] = D[2 * a * ROW]
-                    out[2 + k_sens + a, i] = 0.0
-                i += 1
-            for a in range(k_sens):
-                D[(2 * a + 1) * ROW] = 0.0
-            error_w = 0.0
-            hi, lo = until, 0.0
-            state = 0
-            if freed and n_events < events.shape[0]:
-                events[n_events, 0], events[n_events, 1], events[n_events, 2] = SLIP, until, theta
-                n_events += 1
-            continue
+                    D[(2 * a + 1) * ROW] = 0.0
+                error_w = 0.0
+                hi, lo = until, 0.0
+                steps += 1
+                if way != 0.0:
+                    sign = way
+                    if n_events < events.shape[0]:
+                        events[n_events, 0], events[n_events, 1], events[n_events, 2] = SLIP, until, theta
+                        n_events += 1
+                continue
         s[0], s[3] = hi + lo, sign
         call_jet(address, q.ctypes.data, s.ctypes.data, W.ctypes.data, R.ctypes.data, n)
         steps += 1
@@ -330,5 +292,5 @@ def integrate(
         error_w += math.copysign(local * abs(W[ROW + n]), error_w) + rounding * abs(w)
         worst = max(worst, abs(error_theta))
         if turned:
-            w, w_lo, state = 0.0, 0.0, 1
+            w, w_lo, resting = 0.0, 0.0, True
     return DONE, steps, n_events, worst
