@@ -82,6 +82,7 @@ def fit(
     priors: Mapping[str, float] | None = None,
     loss: str = "linear",
     time_sigma_s: float = 0.0,
+    thorough: bool = True,
 ) -> FitResult:
     """Fit one model to θ(t) and say how far to trust it.
 
@@ -91,6 +92,7 @@ def fit(
         `length` in m, `theta_offset` in rad. `angle_scale` comes from the series' meta where it is there.
     loss : "linear", or a robust one for outliers: "soft_l1", "huber", "cauchy".
     time_sigma_s : standard uncertainty of each time; it adds (σ_t θ̇)² to each σ².
+    thorough : False takes the first start that converges, without looking whether the model then follows the record.
 
     Drag coefficients are ≥ 0. Error bars allow for correlated residuals (see `toolkit.noise`). Poor data gives a
     result with success False, a message and a remedy. Raises UsageError for unknown names or a scene that lacks what
@@ -100,7 +102,7 @@ def fit(
 
     began = time.process_time()
     problem = pose(series, scene or Scene(), model, free, fixed or {}, priors, loss, time_sigma_s)
-    return replace(problem.solve(start or {}), cpu_s=time.process_time() - began)
+    return replace(problem.solve(start or {}, thorough), cpu_s=time.process_time() - began)
 
 
 def fit_models(
@@ -121,18 +123,42 @@ def fit_models(
 
     scene = scene or Scene()
     names = tuple(models or STANDARD)
-    fits: dict[str, FitResult] = {}
-    for i, name in enumerate(names):
-        progress("fitting", i / len(names))
-        given = {**_start_from(fits), **(options.get("start") or {})}
-        fits[name] = fit(
-            series, scene, name, **{**options, "start": given if name.startswith("full") else options.get("start")}
-        )
+    fits = _fit_all(series, scene, names, options, progress)
     freed = _freed_length(series, scene, fits, options)
     if freed is not None:
-        fits = freed
+        loose = {**options, "free": (*options.get("free", ()), "length")}
+        again = _fit_all(series, scene, names, loose, progress)
+        fits = {name: replace(result, warnings=(*result.warnings, freed)) for name, result in again.items()}
     progress("fitting", 1.0)
     return _compared(fits)
+
+
+def _fit_all(
+    series: ThetaSeries, scene: Scene, names: Sequence[str], options: Mapping[str, Any], progress: Progress
+) -> dict[str, FitResult]:
+    """The most general smooth model first, without a given start: it finds the phase that the others then keep."""
+    order = sorted(names, key=lambda name: (not name.startswith("full"), name != _LEADER, names.index(name)))
+    given = dict(options.get("start") or {})
+    fits: dict[str, FitResult] = {}
+    lead: FitResult | None = None
+    for i, name in enumerate(order):
+        progress("fitting", i / len(order))
+        chosen = {**options}
+        if lead is not None:
+            full = name.startswith("full")
+            chosen |= {"start": {**(_shared(lead) if full else {}), **given}, "thorough": False}
+        fits[name] = fit(series, scene, name, **chosen)
+        if lead is None and fits[name].success and name.startswith("full"):
+            lead = fits[name]
+    return {name: fits[name] for name in names}
+
+
+_LEADER = "full_linear_quadratic_drag"
+
+
+def _shared(lead: FitResult) -> dict[str, float]:
+    """What the other full-sine models start from: the leader's values (a model takes those that it has)."""
+    return {name: p.value for name, p in lead.parameters.items() if not p.fixed}
 
 
 def choose_model(fits: Mapping[str, FitResult]) -> str:
@@ -145,18 +171,10 @@ def choose_model(fits: Mapping[str, FitResult]) -> str:
     return min(near or list(good), key=lambda name: (len(good[name].free), good[name].aic))
 
 
-def _start_from(fits: Mapping[str, FitResult]) -> dict[str, float]:
-    """Where the next full-sine model starts: at the last one that converged."""
-    for name, result in reversed(list(fits.items())):
-        if result.success and name.startswith("full"):
-            return {key: p.value for key, p in result.parameters.items() if not p.fixed}
-    return {}
-
-
 def _freed_length(
     series: ThetaSeries, scene: Scene, fits: dict[str, FitResult], options: Mapping[str, Any]
-) -> dict[str, FitResult] | None:
-    """All fits again with the length free, if the record contradicts the length given."""
+) -> str | None:
+    """A warning, if the record contradicts the length given."""
     held = {
         n: r
         for n, r in fits.items()
@@ -164,26 +182,17 @@ def _freed_length(
     }
     if not held or "length" in (options.get("fixed") or {}):
         return None
-    name = min(held, key=lambda n: held[n].chi2)
-    loose = {**options, "free": (*options.get("free", ()), "length")}
-    trial = fit(series, scene, name, **loose)
+    name = _LEADER if _LEADER in held else min(held, key=lambda n: held[n].chi2)
+    trial = fit(series, scene, name, **{**options, "free": (*options.get("free", ()), "length")})
     if not trial.success:
         return None
     fitted, given = trial.parameters["length"], held[name].parameters["length"].value
     if fitted.stderr is None or abs(fitted.value - given) <= 4 * fitted.stderr:
         return None
-    warning = (
+    return (
         f"the length given, {given:.4g} m, contradicts the period: the record asks for {fitted.value:.5g} m "
         f"± {fitted.stderr:.1g} m; the length was fitted. Measure from the pivot to the bob's centre."
     )
-    again: dict[str, FitResult] = {}
-    for other in fits:
-        start = (
-            {**_start_from(again), **(options.get("start") or {})} if other.startswith("full") else options.get("start")
-        )
-        result = fit(series, scene, other, **{**loose, "start": start})
-        again[other] = replace(result, warnings=(*result.warnings, warning))
-    return again
 
 
 def _compared(fits: dict[str, FitResult]) -> dict[str, FitResult]:

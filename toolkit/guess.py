@@ -55,14 +55,15 @@ def guess(
     ratio = np.ones_like(peak) if small_angle else frequency_ratio(peak)
     weight = weight * amplitude**2
     omega_g = float(np.average(omega / ratio, weights=weight))
-    near = omega / ratio
-    keep = np.abs(near - np.median(near)) <= 3 * max(float(np.median(np.abs(near - np.median(near)))), 1e-4 * omega_g)
-    omega_g = float(np.average(near[keep], weights=weight[keep]))
     start, rates = decay_law(time, peak, omega_g, drags)
     start = min(start, 3.1) if not small_angle else start
-    first = int(np.argmin(time))
-    local = omega_g * (1.0 if small_angle else float(frequency_ratio(np.array([start]))[0]))
-    turn = phase[first] - 0.5 * (local + omega[first]) * (time[first] - 0.0) + math.pi / 2
+    turns = _unwrapped(time, omega, phase)
+    run = _run(time, ratio, 1.0 if small_angle else float(frequency_ratio(np.array([start]))[0]))
+    if time.size > 2:
+        omega_g, phase_zero = (float(v) for v in np.polyfit(run, turns, 1, w=amplitude))
+    else:
+        phase_zero = float(turns[0] - omega_g * run[0])
+    turn = phase_zero + math.pi / 2
     phi = turn if small_angle else _amplitude_phase(turn, start)
     return Guess(
         theta0=start,
@@ -73,6 +74,22 @@ def guess(
         noise_rad=noise,
         **rates,
     )
+
+
+def _unwrapped(time: np.ndarray, omega: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """Phases of the stretches without their jumps of 2π: the frequencies at both ends of a gap count its turns."""
+    turns = phase.copy()
+    for i in range(1, time.size):
+        ahead = turns[i - 1] + 0.5 * (omega[i] + omega[i - 1]) * (time[i] - time[i - 1])
+        turns[i] = ahead + math.remainder(phase[i] - ahead, 2 * math.pi)
+    return turns
+
+
+def _run(time: np.ndarray, ratio: np.ndarray, at_zero: float) -> np.ndarray:
+    """∫ ω/ω_g dt from t = 0 to each of the times."""
+    first = 0.5 * (at_zero + ratio[0]) * time[0]
+    steps = 0.5 * (ratio[1:] + ratio[:-1]) * np.diff(time)
+    return first + np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def point_noise(theta_rad: np.ndarray) -> float:

@@ -110,6 +110,7 @@ class Problem:
         """The model at t_s (default: the points) with derivatives of θ and θ̇ by the reported `names`."""
         times = self.t_s if t_s is None else t_s
         reduced, by = self.reduce(values)
+        self._refuse_runaway(reduced, float(times[-1]))
         needed = [c for c in dict.fromkeys(c for name in names for c in by.get(name, {}))]
         stretched = times * (1 + values.get("time_scale", 0.0))
         base = self.model.motion(reduced, stretched, needed)
@@ -122,6 +123,19 @@ class Problem:
             if name == "time_scale":
                 d_theta[:, i] = base.omega * times
         return Motion(base.theta, base.omega, d_theta, d_omega, base.method)
+
+    def _refuse_runaway(self, reduced: Mapping[str, float], stop_s: float) -> None:
+        """Negative drag that would multiply the swing costs an integrator dearly and is never the answer."""
+        omega, peak = reduced["omega_g"], abs(reduced["theta0"])
+        if not (omega > 0 and math.isfinite(peak)):
+            raise ArithmeticError("no such pendulum")
+        rate = (
+            min(reduced.get("alpha_d", 0.0), 0.0)
+            + 4 / (3 * math.pi) * min(reduced.get("beta", 0.0), 0.0) * omega * peak
+        )
+        rate += 2 * min(reduced.get("mu", 0.0), 0.0) / (math.pi * omega * max(peak, 1e-3))
+        if rate * stop_s < -3:
+            raise ArithmeticError("negative drag makes the motion run away")
 
     def predict(self, values: Mapping[str, float], names: Sequence[str]) -> tuple[np.ndarray, np.ndarray, Motion]:
         """What the camera should see, (n,), its derivatives (n, k) by `names`, and the motion itself."""
@@ -138,8 +152,11 @@ class Problem:
 
     # -- solving ------------------------------------------------------------------------------------------------
 
-    def solve(self, start: Mapping[str, float]) -> FitResult:
-        """The best fit from `start` (or the guess), with several starts only where the first fails."""
+    def solve(self, start: Mapping[str, float], thorough: bool = True) -> FitResult:
+        """The best fit from `start` (or the guess), with several starts only where the first fails.
+
+        thorough : False takes the first that converges; for a model beside another that already follows the record.
+        """
         n, k = len(self.series), len(self.free) - len(self.priors)
         if n <= k:
             return self._failed(
@@ -151,7 +168,7 @@ class Problem:
             if found is None:
                 continue
             attempts.append(found)
-            if self._good(found):
+            if self._good(found) or (found.success and not thorough):
                 break
         if not attempts:
             return self._failed("the equation could not be solved from any start; check the times and angles", None)

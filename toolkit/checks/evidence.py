@@ -55,7 +55,7 @@ class Evidence:
             start = (
                 {n: p.value for n, p in like.parameters.items() if not p.fixed} if model.startswith("full") else None
             )
-            self.extra[model] = fit(self.series, self.scene, model, free=free, start=start)
+            self.extra[model] = fit(self.series, self.scene, model, free=free, start=start, thorough=False)
         return self.extra[model]
 
     def chi2(self, result: FitResult) -> float:
