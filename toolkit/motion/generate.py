@@ -334,7 +334,15 @@ class _Jet:
                 f"    v += W[{a * ROW} + k // 2] * W[{a * ROW} + k // 2]",
             ]
         else:
-            self.each += ["v = 0.0", "for j in range(k + 1):", f"    v += W[{a * ROW} + j] * W[{b * ROW} + k - j]"]
+            self.each += [
+                "v, v2 = 0.0, 0.0",
+                "for j in range(0, k, 2):",
+                f"    v += W[{a * ROW} + j] * W[{b * ROW} + k - j]",
+                f"    v2 += W[{a * ROW} + j + 1] * W[{b * ROW} + k - j - 1]",
+                "v += v2",
+                "if k % 2 == 0:",
+                f"    v += W[{a * ROW} + k] * W[{b * ROW}]",
+            ]
         self.each.append(f"W[{row * ROW} + k] = v")
         return row
 
@@ -380,14 +388,23 @@ class _Jet:
         else:
             a = self._row(angle)
             self.first.append(f"v = W[{a * ROW}]")
-            weight = f"W[{ROW} + j - 1]" if a == 0 else f"j * W[{a * ROW} + j]"  # j θ_j = w_{j−1}
+            # j a_j of the argument's series; for θ itself j θ_j = w_{j−1}. Two sums side by side keep the machine busy.
+            one = f"W[{ROW} + j - 1]" if a == 0 else f"j * W[{a * ROW} + j]"
+            two = f"W[{ROW} + j]" if a == 0 else f"(j + 1) * W[{a * ROW} + j + 1]"
             self.each += [
-                "u = 0.0",
-                "v = 0.0",
-                "for j in range(1, k + 1):",
-                f"    x = {weight}",
+                "u, v, u2, v2 = 0.0, 0.0, 0.0, 0.0",
+                "for j in range(1, k, 2):",
+                f"    x, y = {one}, {two}",
                 f"    u += x * W[{cosine * ROW} + k - j]",
                 f"    v += x * W[{sine * ROW} + k - j]",
+                f"    u2 += y * W[{cosine * ROW} + k - j - 1]",
+                f"    v2 += y * W[{sine * ROW} + k - j - 1]",
+                "u += u2",
+                "v += v2",
+                "if k % 2 == 1:",
+                f"    x = {one.replace('j', 'k')}",
+                f"    u += x * W[{cosine * ROW}]",
+                f"    v += x * W[{sine * ROW}]",
                 f"W[{sine * ROW} + k] = u * R[k]",
                 f"W[{cosine * ROW} + k] = -v * R[k]",
             ]
@@ -419,6 +436,12 @@ def _python(expression: Any) -> str:
 
         def _print_Integer(self, number: Any) -> str:
             return f"{int(number)}.0" if abs(int(number)) > 12 else str(int(number))
+
+        def _print_Pow(self, power: Any, rational: bool = False) -> str:
+            base, exponent = power.args
+            if exponent.is_number and not exponent.is_Integer and exponent < 0:  # 0 where its factors are 0, not NaN
+                return f"max({self._print(base)}, 1e-300)**({float(exponent)!r})"
+            return str(super()._print_Pow(power, rational=rational))
 
         def _print_Rational(self, number: Any) -> str:
             return repr(int(number.p) / int(number.q))

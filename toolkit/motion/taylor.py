@@ -25,7 +25,7 @@ MAX_ORDER = ROW - 2
 RECIPROCALS = np.array([0.0] + [1.0 / k for k in range(1, ROW + 1)])
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract"})
 def _polynomial(c: Any, at: int, n: int, x: float) -> float:
     v = c[at + n]
     for k in range(n - 1, -1, -1):
@@ -33,7 +33,7 @@ def _polynomial(c: Any, at: int, n: int, x: float) -> float:
     return v
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract"})
 def _above_first(c: Any, at: int, n: int, x: float) -> float:
     """The polynomial without its constant term."""
     v = c[at + n]
@@ -43,29 +43,14 @@ def _above_first(c: Any, at: int, n: int, x: float) -> float:
 
 
 @njit(cache=True, fastmath={"contract"})
-def _sample(c: Any, at: int, n: int, t: Any, first: int, last: int, hi: float, lo: float, out: Any) -> None:
-    """Values of one series at the samples first … last − 1, four at a time."""
-    i = first
-    while i + 4 <= last:
-        x0, x1, x2, x3 = t[i] - hi - lo, t[i + 1] - hi - lo, t[i + 2] - hi - lo, t[i + 3] - hi - lo
-        v0 = c[at + n]
-        v1 = v0
-        v2 = v0
-        v3 = v0
-        for k in range(n - 1, -1, -1):
-            a = c[at + k]
-            v0 = v0 * x0 + a
-            v1 = v1 * x1 + a
-            v2 = v2 * x2 + a
-            v3 = v3 * x3 + a
-        out[i] = v0
-        out[i + 1] = v1
-        out[i + 2] = v2
-        out[i + 3] = v3
-        i += 4
-    while i < last:
-        out[i] = _polynomial(c, at, n, t[i] - hi - lo)
-        i += 1
+def _sample(c: Any, at: int, n: int, x: Any, count: int, out: Any, first: int) -> None:
+    """Values of one series at x[0] … x[count − 1] into out[first] …; the inner loop runs over samples, side by side."""
+    for j in range(count):
+        out[first + j] = c[at + n]
+    for k in range(n - 1, -1, -1):
+        a = c[at + k]
+        for j in range(count):
+            out[first + j] = out[first + j] * x[j] + a
 
 
 @njit(cache=True)
@@ -102,7 +87,7 @@ def _turning_point(W: Any, n: int, h: float, sign: float) -> tuple[float, bool]:
     return -1.0, False
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract"})
 def _combine(W: Any, columns: Any, values: Any, first: int, last: int, n: int, out: Any, at: int) -> None:
     """A row of the coefficient matrix times the basis series."""
     for k in range(n):
@@ -118,7 +103,7 @@ def _combine(W: Any, columns: Any, values: Any, first: int, last: int, n: int, o
 def _variational(J: Any, lengths: Any, D: Any, at: int, F: Any, f_at: int, forced: bool, n: int, R: Any) -> None:
     """Series of one sensitivity: δθ' = δw, δw' = F_θ δθ + F_w δw + F_p. Rows of D: δθ at `at`, δw one row on."""
     for k in range(n):
-        v = 0.0
+        v = u = 0.0
         if lengths[0] == 2:
             for j in range(k + 1):
                 v += J[j] * D[at + k - j]
@@ -126,9 +111,10 @@ def _variational(J: Any, lengths: Any, D: Any, at: int, F: Any, f_at: int, force
             v = J[0] * D[at + k]
         if lengths[1] == 2:
             for j in range(k + 1):
-                v += J[ROW + j] * D[at + ROW + k - j]
+                u += J[ROW + j] * D[at + ROW + k - j]
         elif lengths[1] == 1:
-            v += J[ROW] * D[at + ROW + k]
+            u = J[ROW] * D[at + ROW + k]
+        v += u
         if forced:
             v += F[f_at + k]
         D[at + k + 1] = D[at + ROW + k] * R[k + 1]
@@ -165,7 +151,7 @@ def integrate(
     W = np.zeros(n_work * ROW)
     J = np.zeros(2 * ROW)
     D = np.zeros((2 * (k_sens + 1)) * ROW)
-    F = np.zeros(ROW)
+    F, x = np.zeros(ROW), np.zeros(256)
     s = np.zeros(4)
     hi, lo = start, 0.0
     theta_lo, w_lo = 0.0, 0.0
@@ -228,10 +214,11 @@ def integrate(
         last = max(abs(W[n]), abs(W[ROW + n]))
         previous = max(abs(W[n - 1]), abs(W[ROW + n - 1]))
         h = end - hi - lo
-        if last > 0.0:
-            h = min(h, math.exp(math.log(tolerance / last) / n))
-        if previous > 0.0:
-            h = min(h, math.exp(math.log(tolerance / previous) / (n - 1)))
+        if last > 0.0 or previous > 0.0:
+            reach = math.log(tolerance / last) / n if last > 0.0 else 1e300
+            if previous > 0.0:
+                reach = min(reach, math.log(tolerance / previous) / (n - 1))
+            h = min(h, math.exp(reach))
         if not (h > 0.0 and h < 1e300):
             return NOT_FINITE, steps, n_events, worst
         turned = False
@@ -244,8 +231,9 @@ def integrate(
                 root, against = _turning_point(W, n, h, sign)
             if root >= 0.0:
                 h, turned = root, True
-        _combine(W, columns, values, layout[1], layout[2], n if lengths[0] == 2 else 1, J, 0)
-        _combine(W, columns, values, layout[2], layout[3], n if lengths[1] == 2 else 1, J, ROW)
+        terms = n if k_sens > 0 else min(n, 8)
+        _combine(W, columns, values, layout[1], layout[2], terms if lengths[0] == 2 else 1, J, 0)
+        _combine(W, columns, values, layout[2], layout[3], terms if lengths[1] == 2 else 1, J, ROW)
         for a in range(k_sens):
             forced = layout[5 + a] > layout[4 + a]
             if forced:
@@ -253,19 +241,24 @@ def integrate(
             _variational(J, lengths, D, 2 * a * ROW, F, 0, forced, n, R)
         at = 2 * k_sens * ROW
         D[at], D[at + ROW] = error_theta, error_w
-        _variational(J, lengths, D, at, F, 0, False, n, R)
+        rough = min(n, 8)  # terms: the error need not be known to many digits
+        _variational(J, lengths, D, at, F, 0, False, rough, R)
         # samples inside this step
         j = i
         reach = hi + lo + h
         while j < count and (t[j] <= reach or (t[j] - hi) - lo <= h):
             j += 1
         if j > i:
-            _sample(W, 0, n, t, i, j, hi, lo, out[0])
-            _sample(W, ROW, n, t, i, j, hi, lo, out[1])
-            for a in range(k_sens):
-                _sample(D, 2 * a * ROW, n, t, i, j, hi, lo, out[2 + a])
-                _sample(D, (2 * a + 1) * ROW, n, t, i, j, hi, lo, out[2 + k_sens + a])
-            i = j
+            while i < j:
+                some = min(j - i, x.size)
+                for m in range(some):
+                    x[m] = (t[i + m] - hi) - lo
+                _sample(W, 0, n, x, some, out[0], i)
+                _sample(W, ROW, n, x, some, out[1], i)
+                for a in range(k_sens):
+                    _sample(D, 2 * a * ROW, n, x, some, out[2 + a], i)
+                    _sample(D, (2 * a + 1) * ROW, n, x, some, out[2 + k_sens + a], i)
+                i += some
         # the next state, with what the last sums lost
         change = _above_first(W, 0, n, h) + theta_lo
         new = theta + change
@@ -281,8 +274,8 @@ def integrate(
         hi = new
         for a in range(2 * k_sens):
             D[a * ROW] = _polynomial(D, a * ROW, n, h)
-        error_theta = _polynomial(D, at, n, h)
-        error_w = _polynomial(D, at + ROW, n, h)
+        error_theta = _polynomial(D, at, rough, h)
+        error_w = _polynomial(D, at + ROW, rough, h)
         power = h**n
         seed = (seed * 1103515245 + 12345) % 2147483648
         noise = 0.5 if seed < 1073741824 else -0.5  # rounding errors add like a random walk
