@@ -1,0 +1,1 @@
+"""What accuracy costs in time, one subject a file; each has `measure(folder, quick, progress) -> text`."""
