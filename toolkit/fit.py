@@ -146,7 +146,7 @@ def _fit_all(
         chosen = {**options}
         if lead is not None:
             full = name.startswith("full")
-            chosen |= {"start": {**(_shared(lead) if full else {}), **given}, "thorough": False}
+            chosen |= {"start": {**(_shared(lead, name) if full else {}), **given}, "thorough": False}
         fits[name] = fit(series, scene, name, **chosen)
         if lead is None and fits[name].success and name.startswith("full"):
             lead = fits[name]
@@ -156,9 +156,13 @@ def _fit_all(
 _LEADER = "full_linear_quadratic_drag"
 
 
-def _shared(lead: FitResult) -> dict[str, float]:
-    """What the other full-sine models start from: the leader's values (a model takes those that it has)."""
-    return {name: p.value for name, p in lead.parameters.items() if not p.fixed}
+def _shared(lead: FitResult, model: str) -> dict[str, float]:
+    """What another full-sine model starts from: the leader's swing, and its drags where the other has them all."""
+    from toolkit.models import load_model
+
+    drags = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
+    keeps = set(load_model(lead.model).drags) <= set(load_model(model).drags)
+    return {name: p.value for name, p in lead.parameters.items() if not p.fixed and (keeps or name not in drags)}
 
 
 def choose_model(fits: Mapping[str, FitResult]) -> str:

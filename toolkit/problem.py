@@ -179,10 +179,11 @@ class Problem:
         """First the guess (with what is given in its place), then others, each cheaper to compute than a fit."""
         given = {name: value for name, value in start.items() if name in self.free}
         guessed = [name for name in self.free if name not in _NOT_GUESSED]
-        if all(name in given for name in guessed):
+        whole = all(name in given for name in guessed)
+        if whole:
             yield {**self.values, **given}
         begin = {**self.values, **self._from_guess(self._guess())}
-        if given:
+        if given and not whole:
             yield {**begin, **given}
         yield begin
         yield from self._grown()
@@ -300,7 +301,7 @@ class Problem:
                 return None
             parameters.add(name, value=begin[name])
         minimizer = lmfit.Minimizer(
-            lambda p: evaluate(p)[0], parameters, scale_covar=False, max_nfev=150, nan_policy="omit"
+            lambda p: evaluate(p)[0], parameters, scale_covar=False, max_nfev=100, nan_policy="omit"
         )
         with np.errstate(all="ignore"):
             try:
