@@ -70,8 +70,7 @@ def _compiled() -> Any:
                     if along > 0 and abs(dx * uy - dy * ux) < 4.0 + 0.25 * max(0.0, 2 * radius - along):
                         continue
                 n = seen[y, x] + 1.0
-                if n > most:
-                    n = most
+                n = min(n, most)
                 seen[y, x] = n
                 mean[y, x] += (plane[y - y0, x - x0] * factor - mean[y, x]) / n
 

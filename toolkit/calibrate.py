@@ -56,7 +56,7 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     direction = np.unwrap(np.arctan2(x - px, y - py))
     distance = np.hypot(x - px, y - py)
     length = float(np.median(distance))
-    vertical, vertical_sigma = _vertical(t, x, y, sx, sy, pivot, length)
+    vertical, vertical_sigma = _vertical(track, t, x, y, sx, sy, pivot)
     theta = direction - vertical
     sigma = np.hypot(np.cos(direction) * sx, np.sin(direction) * sy) / distance
     scale_u = pivot.sigma_px[1] / length
@@ -230,33 +230,29 @@ def _string_pivot(track: Track, kept: np.ndarray) -> PivotEstimate | None:
 
 
 def _vertical(
-    t: np.ndarray, x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray, pivot: PivotEstimate, length: float
+    track: Track, t: np.ndarray, x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray, pivot: PivotEstimate
 ) -> tuple[float, float]:
-    """Direction of rest in the picture and its σ: a decaying swing fitted with the pivot held."""
-    start = start_swing(t[: max(12, t.size // 8)], x[: max(12, t.size // 8)], y[: max(12, t.size // 8)])
-    direction = np.unwrap(np.arctan2(x - pivot.xy[0], y - pivot.xy[1]))
+    """Direction of rest in the picture and its σ: a decaying swing fitted with the pivot held.
+
+    Where the motion is no free swing (a driven one), the middle between the extremes, with a wide σ.
+    """
+    px, py = pivot.xy
+    direction = np.unwrap(np.arctan2(x - px, y - py))
+    length = float(np.median(np.hypot(x - px, y - py)))
     middle = float(0.5 * (direction.max() + direction.min()))
+    wide = middle, float(np.ptp(direction) / 20)
+    known = track.meta.get("swing")
+    start = start_swing(t, x, y) if known is None else np.array(known, float)
     if start is None:
-        return middle, float(np.ptp(direction) / 20)
-    sigma = np.sqrt(sx * sy)
-    swing = None
-    part = 0.12
-    while True:
-        n = max(12, min(t.size, int(part * t.size)))
-        every = max(1, n // 2000)
-        start[0:3] = pivot.xy[0], pivot.xy[1], length
-        swing = fit_swing(
-            t[:n:every], x[:n:every], y[:n:every], sigma[:n:every], start,
-            free=("length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0"),
-        )  # fmt: skip
-        if swing is None or n == t.size:
-            break
-        start = swing.values.copy()
-        part *= 2
+        return wide
+    turned = np.arctan2(start[0] - px, length) * (1 if known is not None else 0)
+    start[:4] = px, py, length, start[3] + turned
+    every = max(1, t.size // 2000)
+    free = ("length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0")
+    sigma = np.maximum(np.sqrt(sx * sy), 1e-4)
+    swing = fit_swing(t[::every], x[::every], y[::every], sigma[::every], start, free=free)
     if swing is None or abs(swing.values[3] - middle) > 0.3 * np.ptp(direction):
-        return middle, float(np.ptp(direction) / 20)
-    across = pivot.sigma_px[0] / length  # a pivot error across the swing turns the vertical with it
-    del across
+        return wide
     return float(swing.values[3]), float(np.sqrt(max(swing.covariance[3, 3], 1e-18)))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from toolkit.errors import JobError, UsageError
 from toolkit.output import whole_file
 from toolkit.progress import Progress, silent
 from toolkit.search import Hypothesis, find_round_movers, shrink
-from toolkit.swing import NAMES, Swing, fit_swing, start_swing
+from toolkit.swing import Swing, fit_swing, start_swing
 from toolkit.trackers import load_tracker
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
@@ -463,6 +463,7 @@ class _Job:
 
     def finish(self, fps_factor: float) -> Track:
         """Judge the whole motion, bridge the gaps, make σ true."""
+        self.t = list(_even_times(np.array(self.t), self.video, self.log))
         t = np.array(self.t)
         t = t - t[0]
         x, y = np.array(self.x), np.array(self.y)
@@ -489,11 +490,15 @@ class _Job:
         warnings = [*self.video.warnings, *clock_warnings(t, self.video), *self.warnings]
         log = [
             *self.log,
-            f"The bob was followed with the {self.localiser.name} localiser (radius {self.look.radius_px:.2f} px, "
-            f"edge {self.look.edge_px:.2f} px, exposure {self.exposure_s / fps_factor * 1e3:.1f} ms): "
-            f"{good.sum()} of {good.size} frames measured, {bridged.sum()} bridged by the fitted motion.",
-            f"The error bars of the fit were multiplied by {scale[0]:.2f} (x) and {scale[1]:.2f} (y), "
-            "the scatter seen about a smooth motion.",
+            (
+                f"The bob was followed with the {self.localiser.name} localiser (radius {self.look.radius_px:.2f} px, "
+                f"edge {self.look.edge_px:.2f} px, exposure {self.exposure_s / fps_factor * 1e3:.1f} ms): "
+                f"{good.sum()} of {good.size} frames measured, {bridged.sum()} bridged by the fitted motion."
+            ),
+            (
+                f"The error bars of the fit were multiplied by {scale[0]:.2f} (x) and {scale[1]:.2f} (y), "
+                "the scatter seen about a smooth motion."
+            ),
         ]
         return Track(
             frame=np.array(self.index),
@@ -520,6 +525,7 @@ class _Job:
                 "visible": np.array(self.visible),
                 "misfit": np.array(self.misfit),
                 "residual_rms_px": swing.rms_px,
+                "swing": _at_first_measured(swing, t + t0, good, fps_factor),
                 "log": log,
                 "warnings": warnings,
             },
@@ -599,11 +605,46 @@ def _true_sigma(
     return tuple(float(np.sqrt(np.mean((r[good] / s[good]) ** 2))) for r, s in ((rx, sx), (ry, sy)))  # type: ignore[return-value]
 
 
+def _even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:
+    """Time stamps that a file keeps only to the millisecond (Matroska, WebM), put back on their even grid.
+
+    Only where every stamp agrees with one constant frame rate to within its rounding; else as they are.
+    """
+    tick = video.tick_s
+    if tick < 2e-4 or t.size < 10:
+        return t
+    n = np.arange(t.size)
+    rate = (t.size - 1) / (t[-1] - t[0]) if t[-1] > t[0] else 0.0
+    claimed = video.fps_header
+    if claimed and abs(claimed / max(rate, 1e-9) - 1) * t.size < 0.5 * (rate * tick) + 0.02 * rate * tick * t.size:
+        rate = claimed
+    if rate <= 0:
+        return t
+    grid = n / rate
+    off = t - grid
+    if np.ptp(off) > 1.05 * tick:
+        return t
+    log.append(
+        f"The file keeps times to {tick * 1e3:.3g} ms only; all agree with {rate:.6g} frames per second, which was used."
+    )
+    return grid + 0.5 * (off.max() + off.min())
+
+
+def _at_first_measured(swing: Swing, t: np.ndarray, good: np.ndarray, fps_factor: float) -> list[float]:
+    """The fitted motion's values (the order of `toolkit.swing.NAMES`) with the state at the first measured frame."""
+    theta, rate = swing.angle(t[good][:1])
+    values = swing.values.copy()
+    values[7:] = theta[0], rate[0] * fps_factor
+    values[4] *= fps_factor**2
+    values[5] *= fps_factor
+    return [float(v) for v in values]
+
+
 def _bridged(good: np.ndarray, t: np.ndarray, period_s: float) -> np.ndarray:
     """Frames between two measured ones that are less than a period apart."""
     seen = np.flatnonzero(good)
     bridged = np.zeros(good.size, bool)
-    for a, b in zip(seen[:-1], seen[1:]):
+    for a, b in pairwise(seen):
         if b - a > 1 and t[b] - t[a] < period_s:
             bridged[a + 1 : b] = True
     return bridged

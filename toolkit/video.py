@@ -51,7 +51,8 @@ class Video:
     """A video that can be iterated any number of times; each time decodes the file anew.
 
     fps_header is what the file claims (None where it does not); `time_source` says where time stamps come from:
-    `pts` (the file's own), `opencv`, `frame rate` (none in the file: index/fps) or `pictures`.
+    `pts` (the file's own), `opencv`, `frame rate` (none in the file: index/fps) or `pictures`; `tick_s` is the step to
+    which the file rounds them.
     """
 
     path: Path
@@ -62,6 +63,7 @@ class Video:
     time_source: str
     rotation_deg: int = 0
     full_range: bool = False
+    tick_s: float = 0.0
     metadata: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     _frames: Callable[[], Iterator[Frame]] = field(default=lambda: iter(()), repr=False, compare=False)
@@ -85,14 +87,14 @@ def open_video(path: str | Path, fps: float | None = None) -> Video:
     if path.stat().st_size == 0:
         raise JobError(f"video {path} is empty (0 bytes); copy it from the phone again")
     try:
-        import av  # noqa: F401
+        import av
     except ImportError:
         return _open_opencv(path)
     try:
         return _open_pyav(path)
     except JobError:
         raise
-    except Exception as error:  # PyAV raises many kinds; the fallback decides
+    except (av.error.FFmpegError, OSError, ValueError, IndexError, EOFError) as error:  # the fallback decides
         try:
             return _open_opencv(path)
         except JobError:
@@ -127,6 +129,12 @@ def _open_pyav(path: Path) -> Video:
         stamped = first.pts is not None
         full = int(getattr(first, "color_range", 0) or 0) == 2 or first.format.name.startswith("yuvj")
         codec = stream.codec_context.name
+        tick = float(stream.time_base) if stream.time_base else 0.0
+        seconds = float(stream.duration * stream.time_base) if stream.duration and stream.time_base else None
+        if seconds is None and container.duration:
+            seconds = container.duration / 1e6
+        if seconds:
+            metadata["duration_s"] = f"{seconds:.6g}"
     warnings = [] if stamped else ["the file has no time stamps; frame number / frame rate is used instead"]
     return Video(
         path=path,
@@ -137,6 +145,7 @@ def _open_pyav(path: Path) -> Video:
         time_source="pts" if stamped else "frame rate",
         rotation_deg=rotation,
         full_range=full,
+        tick_s=tick,
         metadata=metadata,
         warnings=tuple(warnings),
         _frames=lambda: _decode_pyav(path, rotation, fps),

@@ -23,155 +23,236 @@ SECTORS = 24
 def compiled() -> Any:
     """The compiled fit (compiled at the first call ever, then from the disk).
 
-    fit(image, back, seen, start (cx, cy, R, s), streak (bx, by), string_rad, string_half_rad, noise, free, turns, out)
-    with free 6 (centre, shading, gain) or 8 (and R, s). Writes out = cx, cy, R, s, var_x, var_y, cov_xy, misfit,
-    visible, contrast, gain, pixels; returns False where the normal equations are singular or the centre left the patch.
+    fit(image, back, seen, start (cx, cy, R, s), streak (bx, by), string_rad, string_half_rad, noise, contrast, free,
+    turns, out) with free 6 (centre, shading, gain) or 8 (and R, s). Writes out = cx, cy, R, s, var_x, var_y, cov_xy,
+    misfit, visible, contrast, gain, pixels, wall; returns False where it did not settle: singular normal equations,
+    the centre left the patch, or the steps did not become small.
     """
     import numba
 
+    @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+    def products(slope, weight, rest, count, free, normal, right, weighted):  # type: ignore[no-untyped-def]
+        for a in range(free):
+            for i in range(count):
+                weighted[i] = slope[a, i] * weight[i]
+            total = 0.0
+            for i in range(count):
+                total += weighted[i] * rest[i]
+            right[a] = total
+            for b in range(a + 1):
+                total = 0.0
+                for i in range(count):
+                    total += weighted[i] * slope[b, i]
+                normal[a, b] = total
+
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def fit(image, back, seen, start, streak, string_rad, string_half_rad, noise, free, turns, out):  # type: ignore[no-untyped-def]
+    def decompose(normal, lower, free):  # type: ignore[no-untyped-def]
+        for a in range(free):
+            for b in range(a + 1):
+                value = normal[a, b] * (1.0 + 1e-9) if a == b else normal[a, b]
+                for c in range(b):
+                    value -= lower[a, c] * lower[b, c]
+                if a == b:
+                    if not value > 1e-12 * normal[a, a]:
+                        return False
+                    lower[a, a] = np.sqrt(value)
+                else:
+                    lower[a, b] = value / lower[b, b]
+        return True
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def solve(lower, right, step, free):  # type: ignore[no-untyped-def]
+        for a in range(free):
+            value = right[a]
+            for b in range(a):
+                value -= lower[a, b] * step[b]
+            step[a] = value / lower[a, a]
+        for a in range(free - 1, -1, -1):
+            value = step[a]
+            for b in range(a + 1, free):
+                value -= lower[b, a] * step[b]
+            step[a] = value / lower[a, a]
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def fit(image, back, seen, start, streak, string_rad, string_half_rad, noise, contrast, free, turns, out):  # type: ignore[no-untyped-def]
         rows, columns = image.shape
         cx, cy, radius, soft = start[0], start[1], start[2], start[3] * 2.6457513110645907
         bx, by = streak[0], streak[1]
         length = np.sqrt(bx * bx + by * by)
-        samples = 1 + int(min(11.0, np.ceil(length / max(0.4 * soft, 0.7) - 0.5)))
+        # along the streak the distance to the edge is taken as linear in each of a few pieces
+        pieces = 1 + int(min(15.0, length / np.sqrt(radius + 1.0)))
+        bend = 0.125 * length * length / radius
+        share = 1.0 / pieces
+        room = int(min(rows * columns, 6.3 * (radius + 3.0) * (2.0 * soft + 4.0 + 1.3 * length + 2.0 * bend) + 64)) | 1
+        slope = np.empty((8, room))
+        rest = np.empty(room)
+        weight = np.empty(room)
+        spare = np.empty(room)
         normal = np.zeros((8, 8))
+        lower = np.zeros((8, 8))
         right = np.zeros(8)
         step = np.zeros(8)
-        slope = np.zeros(8)
         good = np.zeros(24)
         total = np.zeros(24)
-        lower = np.zeros((8, 8))
-        f0 = fx = fy = 0.0
-        gain = 1.0
         has_string = not np.isnan(string_rad)
         sx, sy = np.cos(string_rad), np.sin(string_rad)
         string_cos = np.cos(string_half_rad)
-        misfit = 0.0
+        f0 = fx = fy = 0.0
+        gain = 1.0
+        known = contrast != 0.0
+        first = 1 if known else 0  # turn 0, the centre held, finds shading and gain where nothing is known of them
+        misfit = wall = 0.0
         count = 0
-        weights = 0.0
-        wall = 0.0
         last = False
-        for turn in range(turns + 1):
+        for turn in range(first, turns + 1):
             last = last or turn == turns
-            normal[:] = 0.0
-            right[:] = 0.0
-            good[:] = 0.0
-            total[:] = 0.0
-            squares = 0.0
-            weights = 0.0
-            count = 0
-            wall = 0.0
-            walls = 0
             reach = soft + 1.5 + 0.5 * length
             outer, inner = radius + reach, max(0.0, radius - reach)
-            x0, x1 = max(0, int(np.floor(cx - outer))), min(columns - 1, int(np.ceil(cx + outer)))
-            y0, y1 = max(0, int(np.floor(cy - outer))), min(rows - 1, int(np.ceil(cy + outer)))
-            if not (x1 - x0 > 2 and y1 - y0 > 2):
+            y0, y1 = max(0, int(np.ceil(cy - outer))), min(rows - 1, int(np.floor(cy + outer)))
+            if y1 - y0 < 3:
                 return False
+            if known and turn == 1:
+                level, number = 0.0, 0
+                row = min(max(int(cy), 0), rows - 1)
+                for x in (max(0, int(cx - outer)), min(columns - 1, int(cx + outer))):
+                    level += back[row, x]
+                    number += 1
+                wall = level / number
+                f0 = wall + contrast
             cut = np.inf
-            if turn > 0:
-                cut = max(5.0 * noise, 0.25 * abs(f0 - gain * out[12]))
+            if turn > 1:
+                cut = max(5.0 * noise, 0.25 * abs(f0 - gain * wall))
+            squares = weights = walls = 0.0
+            count = taken = beyond = 0
+            unit = 1.0 / radius
+            if last:
+                good[:] = 0.0
+                total[:] = 0.0
             for row in range(y0, y1 + 1):
                 dy = row - cy
-                for column in range(x0, x1 + 1):
+                half = np.sqrt(max(0.0, outer * outer - dy * dy))
+                hole = np.sqrt(max(0.0, inner * inner - dy * dy))
+                x0, x1 = max(0, int(np.ceil(cx - half))), min(columns - 1, int(np.floor(cx + half)))
+                column = x0 - 1
+                while column < x1:
+                    column += 1
                     dx = column - cx
-                    square = dx * dx + dy * dy
-                    if square > outer * outer or square < inner * inner:
+                    if hole > 0.0 and -hole < dx < hole:
+                        column = int(np.floor(cx + hole))
                         continue
+                    d = np.sqrt(dx * dx + dy * dy) + 1e-9
                     if has_string:
                         along = dx * sx + dy * sy
-                        if along > 0.0 and along > string_cos * np.sqrt(square):
+                        if along > 0.0 and along > string_cos * d:
                             continue
-                    alpha = gx = gy = gr = gh = 0.0
-                    for k in range(samples):
-                        u = (k + 0.5) / samples - 0.5
-                        ex = dx - u * bx
-                        ey = dy - u * by
-                        d = np.sqrt(ex * ex + ey * ey) + 1e-9
-                        v = (radius - d) / soft
-                        if v >= 1.0:
-                            alpha += 1.0
-                        elif v > -1.0:
-                            v2 = v * v
-                            alpha += 0.5 + 0.9375 * v * (1.0 - v2 * (0.6666666666666666 - 0.2 * v2))
-                            peak = 0.9375 * (1.0 - v2) * (1.0 - v2) / soft
-                            gx += peak * ex / d
-                            gy += peak * ey / d
-                            gr += peak
-                            gh -= peak * v
-                    alpha /= samples
-                    wall_here = back[row, column]
-                    pixel = image[row, column]
-                    inside = f0 + fx * dx / radius + fy * dy / radius
-                    contrast = (inside - gain * wall_here) / samples
-                    slope[0] = contrast * gx - alpha * fx / radius
-                    slope[1] = contrast * gy - alpha * fy / radius
-                    slope[2] = alpha
-                    slope[3] = alpha * dx / radius
-                    slope[4] = alpha * dy / radius
-                    slope[5] = (1.0 - alpha) * wall_here
-                    slope[6] = contrast * gr
-                    slope[7] = contrast * gh
-                    rest = pixel - gain * wall_here * (1.0 - alpha) - inside * alpha
-                    if turn == 0:  # linear in shading and gain, the centre held: a start for those
-                        slope[0] = slope[1] = slope[6] = slope[7] = 0.0
-                        rest = pixel - wall_here * (1.0 - alpha)
-                    if alpha < 0.5:
-                        wall += wall_here
-                        walls += 1
-                    n = seen[row, column]
-                    bare = (1.0 - alpha) * (1.0 - alpha)
-                    weight = 1.0 / (1.0 + bare / n) if n > 0 else 1.0 / (1.0 + 3.0 * bare)
-                    sector = int((np.arctan2(dy, dx) + np.pi) * 3.8197186342054885) if last else 0
-                    if last:
-                        sector = min(23, max(0, sector))
-                        total[sector] += 1.0
-                    count += 1
-                    if abs(rest) > cut:
+                    alpha = gr = gh = 0.0
+                    one = 1.0 / d
+                    hx, hy = dx * one, dy * one
+                    # how far the streak carries the edge across this pixel, and how its bend adds to that
+                    swept = 0.5 * abs(bx * hx + by * hy) + bend
+                    off = d - radius
+                    if abs(off) > swept + soft + 1.5:
                         continue
-                    if last:
-                        good[sector] += 1.0
-                    squares += weight * rest * rest
-                    weights += weight
-                    for a in range(free):
-                        wa = weight * slope[a]
-                        right[a] += wa * rest
-                        for b in range(a + 1):
-                            normal[a, b] += wa * slope[b]
-            if count < 12 or weights < 6.0:
-                return False
-            out[12] = wall / max(walls, 1)
-            if turn == 0:
-                normal[0, 0] = normal[1, 1] = 1.0
-                if free > 6:
-                    normal[6, 6] = normal[7, 7] = 1.0
-            for a in range(free):  # Cholesky
-                normal[a, a] *= 1.0 + 1e-9
-                for b in range(a + 1):
-                    value = normal[a, b]
-                    for c in range(b):
-                        value -= lower[a, c] * lower[b, c]
-                    if a == b:
-                        if not value > 1e-12 * normal[a, a]:
-                            return False
-                        lower[a, a] = np.sqrt(value)
+                    if off >= swept + soft:
+                        alpha = 0.0
+                    elif off <= -swept - soft:
+                        alpha = 1.0
+                    elif length < 0.05:
+                        v = min(1.0, max(-1.0, (radius - d) / soft))
+                        v2 = v * v
+                        alpha = 0.5 + 0.9375 * v * (1.0 - v2 * (0.6666666666666666 - 0.2 * v2))
+                        gr = 0.9375 * (1.0 - v2) * (1.0 - v2) / soft
+                        gh = -gr * v
                     else:
-                        lower[a, b] = value / lower[b, b]
+                        ex, ey = dx + 0.5 * bx, dy + 0.5 * by
+                        va = (radius - np.sqrt(ex * ex + ey * ey)) / soft
+                        for k in range(1, pieces + 1):
+                            u = k * share - 0.5
+                            ex, ey = dx - u * bx, dy - u * by
+                            vb = (radius - np.sqrt(ex * ex + ey * ey)) / soft
+                            if va >= 1.0 and vb >= 1.0:
+                                alpha += 1.0
+                            elif va > -1.0 or vb > -1.0:
+                                if abs(vb - va) > 1e-3:
+                                    slant = 1.0 / (vb - va)
+                                    pa, pb = min(1.0, max(-1.0, va)), min(1.0, max(-1.0, vb))
+                                    qa, qb = pa * pa, pb * pb
+                                    # the edge function's integral, and the edge function itself, at both ends
+                                    ia = 0.5 * va + 0.9375 * qa * (
+                                        0.5 - qa * (0.16666666666666666 - 0.03333333333333333 * qa)
+                                    )
+                                    ib = 0.5 * vb + 0.9375 * qb * (
+                                        0.5 - qb * (0.16666666666666666 - 0.03333333333333333 * qb)
+                                    )
+                                    ia += 0.5 * abs(va - pa)
+                                    ib += 0.5 * abs(vb - pb)
+                                    ea = pa * (1.0 - qa * (0.6666666666666666 - 0.2 * qa))
+                                    eb = pb * (1.0 - qb * (0.6666666666666666 - 0.2 * qb))
+                                    alpha += (ib - ia) * slant
+                                    peak = 0.9375 * (eb - ea) * slant
+                                else:
+                                    v = min(1.0, max(-1.0, 0.5 * (va + vb)))
+                                    v2 = v * v
+                                    alpha += 0.5 + 0.9375 * v * (1.0 - v2 * (0.6666666666666666 - 0.2 * v2))
+                                    peak = 0.9375 * (1.0 - v2) * (1.0 - v2)
+                                gr += peak
+                                gh -= peak * min(1.0, max(-1.0, 0.5 * (va + vb)))
+                            va = vb
+                        alpha *= share
+                        gr *= share / soft
+                        gh *= share / soft
+                    gx, gy = gr * hx, gr * hy
+                    wall_here = back[row, column]
+                    nx, ny = dx * unit, dy * unit
+                    bare = 1.0 - alpha
+                    if turn == 0:
+                        difference = 0.0
+                        off = image[row, column] - wall_here * bare
+                    else:
+                        inside = f0 + fx * nx + fy * ny
+                        difference = inside - gain * wall_here
+                        off = image[row, column] - gain * wall_here * bare - inside * alpha
+                    if alpha < 0.5:
+                        walls += wall_here
+                        beyond += 1
+                    taken += 1
+                    keep = abs(off) <= cut
+                    if last:
+                        # sectors of equal diamond angle: no arctangent
+                        turn_of = dy / (abs(dx) + abs(dy) + 1e-12)
+                        sector = int((1.0 + turn_of if dx >= 0.0 else 3.0 - turn_of) * 5.999999)
+                        total[sector] += 1.0
+                        if keep:
+                            good[sector] += 1.0
+                    if not keep or count == room:
+                        continue
+                    n = seen[row, column]
+                    w = n / (n + bare * bare) if n > 0.0 else 1.0 / (1.0 + 3.0 * bare * bare)
+                    slope[0, count] = difference * gx - alpha * fx * unit
+                    slope[1, count] = difference * gy - alpha * fy * unit
+                    slope[2, count] = alpha
+                    slope[3, count] = alpha * nx
+                    slope[4, count] = alpha * ny
+                    slope[5, count] = bare * wall_here
+                    slope[6, count] = difference * gr
+                    slope[7, count] = difference * gh
+                    rest[count] = off
+                    weight[count] = w
+                    squares += w * off * off
+                    weights += w
+                    count += 1
+            if count < 12 or weights < 6.0 or beyond == 0:
+                return False
+            wall = walls / beyond
+            products(slope, weight, rest, count, free, normal, right, spare)
+            if turn == 0:
+                normal[0, 0] = normal[1, 1] = normal[6, 6] = normal[7, 7] = 1.0
+            if not decompose(normal, lower, free):
+                return False
             misfit = np.sqrt(squares / max(1.0, weights - free))
             if last:
                 break
-            for a in range(free):
-                value = right[a]
-                for b in range(a):
-                    value -= lower[a, b] * step[b]
-                step[a] = value / lower[a, a]
-            for a in range(free - 1, -1, -1):
-                value = step[a]
-                for b in range(a + 1, free):
-                    value -= lower[b, a] * step[b]
-                step[a] = value / lower[a, a]
+            solve(lower, right, step, free)
             if turn == 0:
                 f0, fx, fy, gain = step[2], step[3], step[4], 1.0 + step[5]
                 continue
@@ -180,38 +261,26 @@ def compiled() -> Any:
             damp = 1.0 if size <= most else most / size
             cx += damp * step[0]
             cy += damp * step[1]
-            f0 += damp * step[2]
+            f0 += step[2]
             fx += damp * step[3]
             fy += damp * step[4]
             gain += damp * step[5]
+            still = size < 0.03
             if free > 6:
                 radius += min(max(damp * step[6], -0.2 * radius), 0.2 * radius)
                 soft = min(max(soft + damp * step[7], 0.8), 1.2 * radius)
+                still = still and abs(step[6]) < 0.02 and abs(step[7]) < 0.05
             if not (0.0 <= cx <= columns - 1.0 and 0.0 <= cy <= rows - 1.0):
                 return False
-            still = size < 0.02
-            if free > 6:
-                still = still and abs(step[6]) < 0.02 and abs(step[7]) < 0.05
             if turn + 1 == turns and not still and free == 6 and not (damp == 1.0 and size < 0.3):
-                return False  # it has not arrived
-            last = still
-        # covariance of (cx, cy): solve for the first two unit vectors
-        for which in range(2):
-            for a in range(free):
-                value = 1.0 if a == which else 0.0
-                for b in range(a):
-                    value -= lower[a, b] * step[b]
-                step[a] = value / lower[a, a]
-            for a in range(free - 1, -1, -1):
-                value = step[a]
-                for b in range(a + 1, free):
-                    value -= lower[b, a] * step[b]
-                step[a] = value / lower[a, a]
-            if which == 0:
-                out[4] = step[0] * misfit * misfit
-                out[6] = step[1] * misfit * misfit
-            else:
-                out[5] = step[1] * misfit * misfit
+                return False
+            last = still and turn > 1
+        for which in range(2):  # covariance of the centre: solve for the first two unit vectors
+            right[:] = 0.0
+            right[which] = 1.0
+            solve(lower, right, step, free)
+            out[4 + which] = step[which] * misfit * misfit
+            out[6] = step[1 - which] * misfit * misfit
         used = seen_sectors = 0.0
         for k in range(24):
             if total[k] > 0.0:
@@ -219,12 +288,13 @@ def compiled() -> Any:
                 if good[k] > 0.7 * total[k]:
                     seen_sectors += 1.0
         out[0], out[1], out[2], out[3] = cx, cy, radius, soft / 2.6457513110645907
-        out[7], out[8], out[9], out[10], out[11] = (
+        out[7], out[8], out[9], out[10], out[11], out[12] = (
             misfit,
             seen_sectors / max(used, 1.0),
-            f0 - gain * out[12],
+            f0 - gain * wall,
             gain,
-            count,
+            taken,
+            wall,
         )
         return True
 
@@ -251,6 +321,7 @@ def fit_disc(
         guess.string_rad,
         half,
         look.noise,
+        look.contrast if soften == 1.0 else 0.0,
         8 if calibrate else 6,
         turns,
         out,
