@@ -104,7 +104,7 @@ def _fails(
     where: dict[str, float]
     if quadratic >= friction or loss.mu == 0:
         visible = min(_VISIBLE_SHARE, quadratic / 2)
-        threshold = loss.amplitude_of_share(visible)
+        threshold = min(loss.amplitude_of_share(visible), largest)
         inside = amplitude >= threshold
         where = {"amplitude_above_rad": threshold, "amplitude_equal_loss_rad": loss.amplitude_of_share(0.5)}
         sentence = (
@@ -121,7 +121,7 @@ def _fails(
         }
     else:
         visible = min(_VISIBLE_SHARE, friction / 2)
-        threshold = loss.amplitude_of_friction_share(visible)
+        threshold = min(loss.amplitude_of_friction_share(visible), largest)
         inside = amplitude <= threshold
         where = {"amplitude_below_rad": threshold}
         sentence = (
