@@ -172,8 +172,7 @@ class _Writer:
         """terms(q, s, out): the values of the basis functions at one point s = (τ, θ, w, σ)."""
         import sympy as sp
 
-        place: dict[Any, Any] = {}
-        replaced = [self._inner_out(f, place) for f in self.basis]
+        replaced = [self._inner_out(f) for f in self.basis]
         common, reduced = sp.cse(replaced, symbols=sp.numbered_symbols("x"))
         lines = ["def terms(q, s, out):"]
         lines += ["    tau, theta, w, sigma = s[0], s[1], s[2], s[3]"]
@@ -183,7 +182,7 @@ class _Writer:
         lines += [f"    out[{i}] = {_python(value)}" for i, value in enumerate(reduced)]
         return "\n".join(lines)
 
-    def _inner_out(self, expression: Any, place: dict[Any, Any]) -> Any:
+    def _inner_out(self, expression: Any) -> Any:
         """The expression with its largest parameter-only parts replaced by symbols q0, q1 …"""
         import sympy as sp
 
@@ -195,8 +194,11 @@ class _Writer:
             plain, rest = expression.as_independent(*self.inside)
             if plain.free_symbols:
                 kept = sp.Symbol(f"q[{self.inner_index(plain)}]")
-                return expression.func(kept, self._inner_out(rest, place))
-        return expression.func(*[self._inner_out(a, place) for a in expression.args])
+                return expression.func(kept, self._inner_out(rest))
+        parts = [self._inner_out(a) for a in expression.args]
+        if isinstance(expression, sp.Pow) and not parts[1].is_Integer and parts[0] != self.size:
+            parts[0] += sp.Float(1e-300)  # a root of zero has a slope that is finite times zero, not NaN
+        return expression.func(*parts)
 
 
 class _Jet:
@@ -436,12 +438,6 @@ def _python(expression: Any) -> str:
 
         def _print_Integer(self, number: Any) -> str:
             return f"{int(number)}.0" if abs(int(number)) > 12 else str(int(number))
-
-        def _print_Pow(self, power: Any, rational: bool = False) -> str:
-            base, exponent = power.args
-            if exponent.is_number and not exponent.is_Integer and exponent < 0:  # 0 where its factors are 0, not NaN
-                return f"max({self._print(base)}, 1e-300)**({float(exponent)!r})"
-            return str(super()._print_Pow(power, rational=rational))
 
         def _print_Rational(self, number: Any) -> str:
             return repr(int(number.p) / int(number.q))
