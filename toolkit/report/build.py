@@ -76,13 +76,10 @@ def facts(material: Material) -> tuple[Fact, ...]:
     words, best, scene = material.words, material.best, material.analysis.scene
     if not best.success:
         return (Fact(words("question.drag"), words("answer.failed"), best.message),)
-    found = [
-        Fact(
-            words("question.drag"),
-            _drag_answer(material, best),
-            words("answer.model", model=model_name(words, best.model)),
-        )
-    ]
+    remark = words("answer.model", model=model_name(words, best.model))
+    if "alpha_d" in best.parameters:
+        remark += f"; {words('answer.no_mass')}"
+    found = [Fact(words("question.drag"), _drag_answer(material, best), remark)]
     found.append(Fact(words("question.sure"), _sure(material, best), _inflation(words, best)))
     paper = material.paper
     if paper is not None and paper is not best and paper.success:
@@ -92,24 +89,38 @@ def facts(material: Material) -> tuple[Fact, ...]:
     for name in MAIN:
         finding = _finding(material, name)
         if finding is not None:
-            found.append(Fact(words(f"question.{name}"), _short_answer(words, finding), ""))
-    period = parameter(best, "T0")
+            found.append(Fact(words(f"question.{name}"), _short_answer(material, finding), ""))
+    period = parameter(material.full_sine, "T0")
     if period is not None:
+        shown = with_uncertainty(period.value, period.stderr, "s")
         found.append(
-            Fact(
-                words("question.period"),
-                f"{_symbol(words, 'T0')} = {with_uncertainty(period.value, period.stderr, 's')}",
-            )
+            Fact(words("question.period"), f"{_symbol(words, 'T0')} = {shown}", _mean_period(material, period.value))
         )
     g = scene.environment.gravity_m_per_s2
     for name in ("length", "equivalent_length"):
-        length = parameter(best, name)
+        length = parameter(material.full_sine, name)
         if length is not None:
             given = name == "length" and length.fixed
             remark = words("answer.given_length") if given else words("answer.equivalent", g=number(g, 6))
             found.append(Fact(words("question.length"), with_uncertainty(length.value, length.stderr, "m"), remark))
             break
     return tuple(found)
+
+
+def _mean_period(material: Material, small_s: float) -> str:
+    """The period at the middle of the amplitudes seen, which is what a stopwatch would give."""
+    from toolkit.cycles import period_of
+
+    if material.cycles is None:
+        return ""
+    amplitude = float(np.median(material.cycles.amplitude_rad))
+    longer = float(period_of(np.array([amplitude]), small_s)[0])
+    values = {
+        "angle": number(math.degrees(amplitude), 3),
+        "period": number(longer, 6),
+        "percent": percent(longer / small_s - 1),
+    }
+    return material.words("answer.mean_period", **values)
 
 
 def _drag_answer(material: Material, result: FitResult) -> str:
@@ -133,21 +144,19 @@ def _sure(material: Material, result: FitResult) -> str:
     for name in DRAGS:
         found = result.parameters.get(name)
         if found is not None and found.stderr and found.value > found.stderr:
-            parts.append((_symbol(words, name), percent(found.stderr / found.value)))
-    if not parts:
-        return "–"
-    listed = parts[0][1] if len(parts) == 1 else ", ".join(f"{symbol} {share}" for symbol, share in parts)
-    return words("answer.sure", percent=listed, sigma="±")
+            parts.append(words("answer.sure", symbol=_symbol(words, name), percent=percent(found.stderr / found.value)))
+    return ", ".join(parts) or "–"
 
 
 def _inflation(words: Words, result: FitResult) -> str:
     factor = float(result.noise.get("inflation", 1.0) or 1.0)
-    return words("answer.inflated", factor=number(factor, 2)) if factor > 1.15 else ""
+    meaning = words("answer.sure_meaning")
+    return f"{meaning}; {words('answer.inflated', factor=number(factor, 2))}" if factor > 1.15 else meaning
 
 
-def _short_answer(words: Words, finding: Finding) -> str:
+def _short_answer(material: Material, finding: Finding) -> str:
     """Yes, no or cannot tell, with the angle that divides."""
-    where, evidence = finding.where, finding.evidence
+    words, where, evidence = material.words, finding.where, finding.evidence
     if finding.verdict == "not_distinguishable":
         return words("answer.unclear")
     if finding.assumption == "small_angle":
@@ -157,6 +166,9 @@ def _short_answer(words: Words, finding: Finding) -> str:
             return words("answer.no_to", angle=angle, widest=number(math.degrees(widest), 3) if widest else "–")
         if finding.verdict == "holds" and widest:
             return words("answer.yes_to", angle=number(math.degrees(widest), 2))
+    widest = float(np.max(np.abs(material.theta - material.offset)))
+    if finding.verdict == "fails" and where.get("amplitude_below_rad", 0.0) >= widest:
+        return words("answer.throughout")
     if finding.verdict == "fails" and "amplitude_above_rad" in where:
         return words("answer.above", angle=number(math.degrees(where["amplitude_above_rad"]), 2))
     if finding.verdict == "fails" and "amplitude_below_rad" in where:
@@ -202,6 +214,8 @@ def remedy(words: Words, finding: Finding) -> str:
 
 def _said(words: Words, kind: str, finding: Finding, otherwise: str) -> str:
     key = f"{kind}.{finding.words_key}"
+    if finding.where.get("amplitude_below_rad", 0.0) > 3 and f"{key}.throughout" in words:
+        key = f"{key}.throughout"
     if key not in words:
         return otherwise
     try:

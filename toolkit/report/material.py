@@ -9,24 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.errors import PendulabError
 from toolkit.report.words import Words
 
 if TYPE_CHECKING:
     from toolkit.analyse import Analysis
+    from toolkit.cycles import Cycles
     from toolkit.fit import FitResult, FittedParameter
 
 PAPER = "small_angle_linear_drag"
-
-
-@dataclass(frozen=True)
-class Cycles:
-    """One entry a full swing: middle time, amplitude and period, each with its standard uncertainty where known."""
-
-    t_s: np.ndarray
-    amplitude_rad: np.ndarray
-    amplitude_sigma_rad: np.ndarray | None
-    period_s: np.ndarray
-    period_sigma_s: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -69,6 +60,12 @@ class Material:
         """The small-angle, linear-drag fit, where it was made."""
         return self.analysis.fits.get(PAPER)
 
+    @cached_property
+    def full_sine(self) -> FitResult:
+        """The best fit with the full sine: its small-swing period is not biased by the swing's width."""
+        full = [r for r in self.analysis.fits.values() if r.success and r.model.startswith("full")]
+        return self.best if any(r is self.best for r in full) or not full else min(full, key=lambda r: r.chi2)
+
     @property
     def usable(self) -> bool:
         """Whether the preferred fit gave a motion to draw."""
@@ -98,7 +95,10 @@ class Material:
     @cached_property
     def cycles(self) -> Cycles | None:
         """Amplitude and period of each swing, None where there are fewer than three."""
-        return find_cycles(self.t, self.theta - self.offset, self.analysis.series.sigma_theta_rad)
+        from toolkit.cycles import cycles
+
+        found = cycles(self.analysis.series, self.best if self.best.success else None)
+        return found if found.t_s.size >= 3 else None
 
     @cached_property
     def sigma(self) -> float:
@@ -114,7 +114,7 @@ class Material:
 
         try:
             return pose(self.analysis.series, self.analysis.scene, result.model)
-        except Exception:  # a fit from elsewhere: its figures are drawn at the measured times
+        except PendulabError:  # a fit made otherwise: its figures are drawn at the measured times
             return None
 
     def curve(self, result: FitResult, t_s: np.ndarray) -> Curve:
@@ -169,68 +169,6 @@ def parameter(result: FitResult, name: str) -> FittedParameter | None:
     return result.parameters.get(name) or result.derived.get(name)
 
 
-def find_cycles(t: np.ndarray, theta: np.ndarray, sigma: np.ndarray | None) -> Cycles | None:
-    """Amplitude and period of each full swing, from zero crossings (line fits) and turning points (parabolas)."""
-    crossings, crossing_u = _crossings(t, theta)
-    if crossings.size < 4:
-        return None
-    half_tops = []
-    for left, right in zip(crossings[:-1], crossings[1:]):
-        inside = (t >= left) & (t <= right)
-        half_tops.append(_top(t[inside], theta[inside]))
-    tops = np.array(half_tops)
-    amplitude = 0.25 * (np.abs(tops[:-2]) + 2 * np.abs(tops[1:-1]) + np.abs(tops[2:]))
-    period = crossings[3:] - crossings[1:-2]  # from crossing to crossing of the same kind, about the middle top
-    middle = 0.5 * (crossings[3:] + crossings[1:-2])
-    amplitude = amplitude[: period.size]
-    good = np.isfinite(amplitude) & (amplitude > 0)
-    typical = np.median(period[good]) if good.any() else math.nan
-    good &= (period < 1.5 * typical) & (period > 0.6 * typical)  # a gap in the record is no long swing
-    if np.sum(good) < 3:
-        return None
-    u = np.hypot(crossing_u[3:], crossing_u[1:-2])
-    return Cycles(middle[good], amplitude[good], None, period[good], u[good])
-
-
-def _crossings(t: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times at which θ passes zero, with the uncertainty that a line through the points nearby leaves."""
-    step = float(np.median(np.diff(t))) if t.size > 1 else 0.0
-    at = np.flatnonzero(np.signbit(theta[1:]) != np.signbit(theta[:-1]))
-    if at.size < 2:
-        return np.array([]), np.array([])
-    half = float(np.median(np.diff(t[at])))
-    at = np.array([i for k, i in enumerate(at) if k == 0 or t[i] - t[at[k - 1]] > 0.3 * half])
-    reach = max(1, int(0.08 * half / step)) if step else 1
-    times, sigmas = [], []
-    for i in at:
-        low, high = max(0, i + 1 - reach), min(t.size, i + 1 + reach)
-        if t[i + 1] - t[i] > 3 * step + 1e-12:
-            continue
-        x, y = t[low:high] - t[i], theta[low:high]
-        slope, level = np.polyfit(x, y, 1)
-        if slope == 0 or abs(level / slope) > half:
-            continue
-        rest = y - slope * x - level
-        scatter = math.sqrt(float(rest @ rest) / max(1, x.size - 2))
-        times.append(t[i] - level / slope)
-        sigmas.append(scatter / abs(slope) / math.sqrt(x.size))
-    return np.array(times), np.array(sigmas)
-
-
-def _top(t: np.ndarray, theta: np.ndarray) -> float:
-    """Signed height of one turning point, from a parabola through the highest third of a half swing."""
-    if t.size < 3:
-        return math.nan
-    k = int(np.argmax(np.abs(theta)))
-    high = np.abs(theta) >= 0.85 * abs(theta[k])
-    if np.sum(high) < 4:
-        return float(theta[k])
-    x = t[high] - t[k]
-    spread = float(np.ptp(x)) or 1.0
-    a, b, c = np.polyfit(x / spread, theta[high], 2)
-    return float(c - b * b / (4 * a)) if a * theta[k] < 0 else float(theta[k])
-
-
 def thinned(n: int, limit: int) -> np.ndarray:
     """Indices of at most `limit` of `n` points, spread evenly but not in step with the swing (golden ratio)."""
     if n <= limit:
@@ -252,11 +190,3 @@ def binned(x: np.ndarray, y: np.ndarray, bins: int = 24) -> tuple[np.ndarray, np
     mean = total[full] / count[full]
     spread = np.sqrt(np.maximum(squares[full] / count[full] - mean**2, 0) / (count[full] - 1))
     return 0.5 * (edges[1:] + edges[:-1])[full], mean, spread
-
-
-def period_ratio(amplitude_rad: np.ndarray) -> np.ndarray:
-    """T/T₀ of the undamped pendulum at each amplitude < π: 1/agm(1, cos(A/2))."""
-    a, b = np.ones_like(amplitude_rad), np.cos(np.minimum(np.abs(amplitude_rad), np.pi - 1e-9) / 2)
-    for _ in range(8):
-        a, b = 0.5 * (a + b), np.sqrt(a * b)
-    return 1 / a

@@ -51,7 +51,7 @@ def with_uncertainty(value: float, u: float | None, unit: str = "", digits: int 
         text = "({} ± {}) × 10^{{{}}}".format(*rounded(scaled_value, scaled_u), str(exponent).replace("-", _MINUS))
         return _joined(text, shown)
     first, second = rounded(value, u)
-    return f"({first} ± {second}) {shown}" if shown else f"{first} ± {second}"
+    return _joined(f"({first} ± {second})", shown) if shown else f"{first} ± {second}"
 
 
 def _joined(text: str, unit: str) -> str:

@@ -13,6 +13,7 @@ from toolkit.report.document import Block, Equation, Figure, Report, Table
 from toolkit.report.html import numbering
 from toolkit.report.numbers import bare, rich
 
+_LINE_MM, _TALLEST_MM = 174, 105
 _SMALL = {"portrait": 62, "frame": 78}
 
 
@@ -51,7 +52,7 @@ def _content(report: Report, root: Path) -> dict[str, Any]:
             "number": numbers[figure.key],
             "caption": rich(figure.caption),
             "alt": bare(figure.caption),
-            "width": _SMALL.get(figure.key, 100),
+            "width": _width_percent(figure),
         }
 
     def block(item: Block) -> dict[str, Any]:
@@ -108,6 +109,15 @@ def _content(report: Report, root: Path) -> dict[str, Any]:
         "sections": [{"title": s.title, "blocks": [block(b) for b in s.blocks]} for s in report.sections],
         "footer": rich(report.footer),
     }
+
+
+def _width_percent(figure: Figure) -> float:
+    """Share of the line's width: no picture takes more than half a page."""
+    box = re.search(r'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"', figure.svg)
+    tallest = 100.0
+    if box:
+        tallest = 100 * _TALLEST_MM / _LINE_MM * float(box[1]) / float(box[2])
+    return round(min(_SMALL.get(figure.key, 100), tallest), 1)
 
 
 def _columns(table: Table) -> list[str]:

@@ -28,11 +28,40 @@ def draw(key: str, lang: str, height_in: float, paint: Callable[[Any], None], wi
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context({**_RC, "svg.hashsalt": key, "font.family": _fonts(lang)}):
-        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        figure = Figure(figsize=(width_in, height_in))
         paint(figure)
         buffer = io.StringIO()
         FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
     return _tidy(buffer.getvalue())
+
+
+def panels(
+    figure: Any,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    left: float = 0.6,
+    gap: float = 0.5,
+    between: float = 0.12,
+    **choices: Any,
+) -> Any:
+    """Axes laid out by margins in inches (a layout engine would take as long as all the rest of a figure).
+
+    left : for labels of the left axes.    gap : between columns.    between : between rows.    choices : to `subplots`.
+    """
+    width, height = figure.get_size_inches()
+    right, bottom, top = 0.08, choices.pop("bottom", 0.48), choices.pop("top", 0.1)
+    across = (width - left - right - gap * (columns - 1)) / columns
+    down = (height - bottom - top - between * (rows - 1)) / rows
+    margins = {
+        "left": left / width,
+        "right": 1 - right / width,
+        "bottom": bottom / height,
+        "top": 1 - top / height,
+        "wspace": gap / across,
+        "hspace": between / down,
+    }
+    return figure.subplots(rows, columns, gridspec_kw=margins, **choices)
 
 
 def formula(key: str, latex: str) -> str:
@@ -126,6 +155,7 @@ _RC: dict[str, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.xmargin": 0.02,
     "grid.color": GRID,
     "grid.linewidth": 0.5,
     "axes.axisbelow": True,
@@ -141,3 +171,18 @@ _RC: dict[str, Any] = {
     "path.simplify": True,
     "path.simplify_threshold": 0.4,
 }
+
+
+def dots(
+    axis: Any, x: Any, y: Any, colour: str, size: float = 1.6, alpha: float = 1.0, label: str | None = None
+) -> None:
+    """Many round points as one short path: a tenth of the bytes and time of as many markers."""
+    import numpy as np
+
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    hair = 1e-4 * (float(np.ptp(x)) or 1.0) if x.size else 0.0
+    xs = np.column_stack([x, x + hair, np.full(x.size, np.nan)]).ravel()
+    ys = np.repeat(y, 3)
+    axis.plot(xs, ys, "-", color=colour, linewidth=size, alpha=alpha, solid_capstyle="round")
+    if label:
+        axis.plot([], [], "o", color=colour, markersize=max(size, 2.2), label=label)

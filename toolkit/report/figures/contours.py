@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.report.document import Figure
 from toolkit.report.material import Material
 from toolkit.report.numbers import bare
-from toolkit.report.style import BEST_MODEL, INK, draw
+from toolkit.report.style import BEST_MODEL, INK, draw, panels
 
 _DRAGS = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
 
@@ -37,7 +37,7 @@ def contours(material: Material) -> Figure | None:
     units = [result.parameters[name].unit for name in result.free]
 
     def paint(figure: Any) -> None:
-        left, right = figure.subplots(1, 2, width_ratios=(1.15, 1))
+        left, right = panels(figure, 1, 2, left=0.85, gap=0.8, bottom=0.62, width_ratios=(1.15, 1))
         turn = np.linspace(0, 2 * np.pi, 181)
         root = np.linalg.cholesky(covariance[np.ix_([first, second], [first, second])] + 0.0)
         for k, alpha in ((2, 0.18), (1, 0.35)):
@@ -85,7 +85,7 @@ def _pair(names: tuple[str, ...], correlation: np.ndarray) -> tuple[int, int]:
 
 
 def _label(words: Any, name: str) -> str:
-    return bare(words.either(f"symbol.{name}", name)).replace("_0", "₀").replace("_", " ")
+    return bare(words.either(f"symbol.{name}", name)).replace("_0", "₀")
 
 
 def _unit(unit: str) -> str:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
+from toolkit.cycles import Cycles, amplitude_of
 from toolkit.report.document import Figure
-from toolkit.report.material import Cycles, Material, value
-from toolkit.report.style import BEST_MODEL, DATA, PAPER_MODEL, draw
+from toolkit.report.material import Material
+from toolkit.report.style import BEST_MODEL, DATA, PAPER_MODEL, dots, draw, panels
 
 _LAWS = (("full_linear_drag", "linear", PAPER_MODEL, "-"), ("full_quadratic_drag", "quadratic", BEST_MODEL, "--"))
 
@@ -28,8 +28,8 @@ def decay(material: Material, width_in: float = 3.35, height_in: float = 2.5) ->
     degrees = np.degrees(cycles.amplitude_rad)
 
     def paint(figure: Any) -> None:
-        top, rest = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1)) if laws else (figure.subplots(), None)
-        top.plot(cycles.t_s, degrees, "o", color=DATA, label=words("figure.measured"), rasterized=False)
+        top, rest = panels(figure, 2, sharex=True, height_ratios=(2, 1)) if laws else (panels(figure), None)
+        dots(top, cycles.t_s, degrees, DATA, 2.2, 1.0, words("figure.measured"))
         for name, (law, colour, dash) in laws.items():
             top.plot(cycles.t_s, np.degrees(law), dash, color=colour, label=words(f"figure.law_{name}"))
         top.set_ylabel(words("figure.amplitude_deg"))
@@ -57,13 +57,7 @@ def _envelope(material: Material, model: str, cycles: Cycles) -> np.ndarray | No
     result = material.analysis.fits.get(model)
     if result is None or not result.success or len(result.theta_rad) != material.t.size:
         return None
-    omega_g = value(result, "omega_g") or (2 * math.pi / (value(result, "T0") or math.nan))
-    if not np.isfinite(omega_g):
-        return None
-    scale = 1 + (value(result, "angle_scale") or 0.0)
-    theta = (result.theta_rad - (value(result, "theta_offset") or 0.0)) / scale
-    sine = np.sqrt(np.clip(np.sin(theta / 2) ** 2 + (result.omega_rad_per_s / (2 * omega_g)) ** 2, 0, 1))
-    return scale * np.interp(cycles.t_s, material.t, 2 * np.arcsin(sine))
+    return np.interp(cycles.t_s, material.t, amplitude_of(result))
 
 
 def _plain_log(axis: Any) -> None:

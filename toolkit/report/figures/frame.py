@@ -13,6 +13,7 @@ from toolkit.report.material import Material, thinned
 from toolkit.report.style import BEST_MODEL, PAPER_MODEL
 
 _WIDTH_PX = 720
+_NAMES = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
 
 
 def frame(material: Material) -> Figure | None:
@@ -74,17 +75,16 @@ def _svg(track: Any, k: int, ok: np.ndarray, width: int, height: int, jpeg: str)
     large = 1 if high - low > np.pi else 0
     arc = f"M{ends[0][0]:.1f} {ends[0][1]:.1f}A{length:.1f} {length:.1f} 0 {large} 0 {ends[1][0]:.1f} {ends[1][1]:.1f}"
     cross = 7 * unit
+    plus = f"M{px - cross:.1f} {py:.1f}H{px + cross:.1f}M{px:.1f} {py - cross:.1f}V{py + cross:.1f}"
     return "\n".join(
         [
-            f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 {top:.1f} {width} {bottom - top:.1f}" '
-            f'width="{width}" height="{bottom - top:.1f}">',
+            f'<svg {_NAMES} viewBox="0 {top:.1f} {width} {bottom - top:.1f}" width="{width}" height="{bottom - top:.1f}">',
             f'<image x="0" y="0" width="{width}" height="{height}" xlink:href="data:image/jpeg;base64,{jpeg}"/>',
             f'<path d="{arc}" fill="none" stroke="#ffffff" stroke-width="{1.2 * unit:.1f}" stroke-dasharray="{5 * unit:.1f} {4 * unit:.1f}"/>',
             f'<g fill="{PAPER_MODEL}">{dots}</g>',
             f'<line x1="{px:.1f}" y1="{py:.1f}" x2="{x:.1f}" y2="{y:.1f}" stroke="{BEST_MODEL}" stroke-width="{1.6 * unit:.1f}"/>',
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{float(track.radius_px):.1f}" fill="none" stroke="{BEST_MODEL}" stroke-width="{1.8 * unit:.1f}"/>',
-            f'<path d="M{px - cross:.1f} {py:.1f}H{px + cross:.1f}M{px:.1f} {py - cross:.1f}V{py + cross:.1f}" stroke="{PAPER_MODEL}" '
-            f'stroke-width="{2.2 * unit:.1f}" fill="none"/>',
+            f'<path d="{plus}" stroke="{PAPER_MODEL}" stroke-width="{2.2 * unit:.1f}" fill="none"/>',
             "</svg>",
         ]
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from toolkit.report.document import Figure
 from toolkit.report.material import Curve, Material
-from toolkit.report.style import BEST_MODEL, DATA, draw
+from toolkit.report.style import BEST_MODEL, DATA, dots, draw, panels
 
 _PERIODS_ENLARGED = 4
 _COLUMNS = 700
@@ -28,7 +29,7 @@ def motion(material: Material) -> Figure | None:
     mass = material.analysis.scene.pendulum.mass_kg
     weight = mass * material.analysis.scene.environment.gravity_m_per_s2 if mass else 1.0
     points = t <= start + span
-    seen = [
+    seen: list[tuple[np.ndarray | None, str, Callable[[np.ndarray], np.ndarray]]] = [
         (np.degrees(material.theta), words("figure.theta_deg"), np.degrees),
         (material.measured_omega, words("figure.omega"), lambda x: x),
         (None, words("figure.tension_n" if mass else "figure.tension_mg"), lambda x: weight * x),
@@ -38,11 +39,11 @@ def motion(material: Material) -> Figure | None:
     long = [np.degrees(material.theta), best.omega_rad_per_s, weight * tension]
 
     def paint(figure: Any) -> None:
-        axes = figure.subplots(3, 2 if whole else 1, squeeze=False, sharex="col")
+        axes = panels(figure, 3, 2 if whole else 1, squeeze=False, sharex="col")
         for row, (measured, label, scale) in enumerate(seen):
             axis = axes[row, -1]
             if measured is not None:
-                axis.plot(t[points], measured[points], "o", color=DATA, label=words("figure.measured"))
+                dots(axis, t[points], measured[points], DATA, 2.2, 1.0, words("figure.measured"))
             middle, band = _of(near, row)
             axis.plot(near.t_s, scale(middle), color=BEST_MODEL, label=words("figure.model"))
             if band is not None:
@@ -72,7 +73,7 @@ def motion(material: Material) -> Figure | None:
         "omega_model_rad_per_s": best.omega_rad_per_s,
     }
     data["tension_over_weight"] = tension
-    return Figure("motion", words("caption.motion"), draw("motion", words.lang, 5.2, paint), data)
+    return Figure("motion", words("caption.motion"), draw("motion", words.lang, 4.5, paint), data)
 
 
 def _of(curve: Curve, row: int) -> tuple[np.ndarray, np.ndarray | None]:

@@ -6,30 +6,29 @@ from typing import Any
 
 import numpy as np
 
+from toolkit.cycles import period_of
 from toolkit.report.document import Figure
-from toolkit.report.material import Material, binned, period_ratio, value
-from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, draw
+from toolkit.report.material import Material, binned, value
+from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, dots, draw, panels
 
 
 def period(material: Material, width_in: float = 3.35, height_in: float = 2.5) -> Figure | None:
     """Measured period of each swing against its amplitude, the pendulum's own curve, and the small-angle line."""
     cycles = material.cycles
-    small = value(material.best, "T0")
+    small = value(material.full_sine, "T0")
     if cycles is None or small is None:
         return None
     words = material.words
     threshold = threshold_rad(material)
     widest = float(cycles.amplitude_rad.max()) * 1.05
     grid = np.linspace(0, min(widest, 3.1), 200)
-    theory = small * period_ratio(grid)
+    theory = period_of(grid, small)
 
     def paint(figure: Any) -> None:
-        axis = figure.subplots()
+        axis = panels(figure)
         degrees = np.degrees(cycles.amplitude_rad)
         many = degrees.size > 60
-        axis.plot(
-            degrees, cycles.period_s, "o", color=DATA, alpha=0.35 if many else 1.0, label=words("figure.one_swing")
-        )
+        dots(axis, degrees, cycles.period_s, DATA, 2.2, 0.5 if many else 1.0, words("figure.one_swing"))
         if many:
             at, mean, error = binned(degrees, cycles.period_s, 16)
             axis.errorbar(
@@ -49,8 +48,7 @@ def period(material: Material, width_in: float = 3.35, height_in: float = 2.5) -
         axis.legend(loc="upper left")
 
     data = {"amplitude_rad": cycles.amplitude_rad, "period_s": cycles.period_s}
-    if cycles.period_sigma_s is not None:
-        data["sigma_period_s"] = cycles.period_sigma_s
+    data["sigma_period_s"] = cycles.sigma_period_s
     return Figure("period", words("caption.period"), draw("period", words.lang, height_in, paint, width_in), data)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.report.document import Figure
 from toolkit.report.material import Material, thinned
-from toolkit.report.style import BEST_MODEL, DATA, MAX_POINTS, draw
+from toolkit.report.style import BEST_MODEL, DATA, MAX_POINTS, dots, draw, panels
 
 
 def portrait(material: Material) -> Figure | None:
@@ -20,14 +20,15 @@ def portrait(material: Material) -> Figure | None:
     best = material.best
 
     def paint(figure: Any) -> None:
-        axis = figure.subplots()
-        axis.plot(
+        axis = panels(figure)
+        dots(
+            axis,
             np.degrees(material.theta[shown]),
             material.measured_omega[shown],
-            "o",
-            color=DATA,
-            markersize=1.6,
-            label=words("figure.measured"),
+            DATA,
+            1.6,
+            1.0,
+            words("figure.measured"),
         )
         turns = material.t <= material.t[0] + 12 * 2 * np.pi / material.omega_g
         axis.plot(

@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.report.document import Figure
 from toolkit.report.material import Material, binned, thinned
-from toolkit.report.style import BEST_MODEL, DATA, MAX_POINTS, PAPER_MODEL, draw
+from toolkit.report.style import BEST_MODEL, DATA, MAX_POINTS, PAPER_MODEL, dots, draw, panels
 
 
 def residuals(material: Material) -> Figure | None:
@@ -29,11 +29,11 @@ def residuals(material: Material) -> Figure | None:
     ]
 
     def paint(figure: Any) -> None:
-        axes = figure.subplots(len(rows), 4, sharey="row", sharex="col", squeeze=False)
+        axes = panels(figure, len(rows), 4, gap=0.12, between=0.3, top=0.25, sharey="row", sharex="col", squeeze=False)
         for line, (result, colour, name) in zip(axes, rows):
             rest = 1e3 * result.residuals_rad
             for axis, (x, _) in zip(line, against):
-                axis.plot(x[shown], rest[shown], "o", color=DATA, markersize=1.2, alpha=0.6)
+                dots(axis, x[shown], rest[shown], DATA, 1.2, 0.7)
                 at, mean, error = binned(x, rest)
                 if at.size:
                     axis.errorbar(at, mean, error, color=colour, linewidth=1.1, elinewidth=0.7)

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.report.document import Figure
 from toolkit.report.material import Material
-from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, draw
+from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, draw, panels
 
 _LINES = 600
 
@@ -43,7 +43,7 @@ def spectrum(material: Material) -> Figure | None:
     shown = (frequency > 0) & (frequency <= min(0.5 / step, 8 * swing if math.isfinite(swing) else np.inf))
 
     def paint(figure: Any) -> None:
-        left, right = figure.subplots(1, 2)
+        left, right = panels(figure, 1, 2, gap=0.62)
         for (_, colour, name), amplitude, correlation in zip(rows, spectra, correlations):
             f, a = _peaks(frequency[shown], 1e3 * amplitude[shown])
             left.semilogy(f, np.maximum(a, 1e-6), color=colour, linewidth=0.7, label=name)

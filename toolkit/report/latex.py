@@ -1,0 +1,118 @@
+"""report.tex: a fragment to \\input, with its figures as files in figures/ and every figure's numbers beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from toolkit.report.document import Block, Equation, Figure, Report, Table
+from toolkit.report.figure_files import write_figures
+from toolkit.report.numbers import rich
+
+_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "°": r"\ensuremath{^\circ}",
+    "±": r"\ensuremath{\pm}",
+    "×": r"\ensuremath{\times}",
+    "−": r"\ensuremath{-}",
+    "≈": r"\ensuremath{\approx}",
+    "√": r"\ensuremath{\sqrt{}}",
+    "²": r"\ensuremath{^2}",
+    "·": r"\ensuremath{\cdot}",
+    "σ": r"\ensuremath{\sigma}",
+    "θ": r"\ensuremath{\theta}",
+    "α": r"\ensuremath{\alpha}",
+    "β": r"\ensuremath{\beta}",
+    "μ": r"\ensuremath{\mu}",
+    "τ": r"\ensuremath{\tau}",
+    "φ": r"\ensuremath{\phi}",
+    "ψ": r"\ensuremath{\psi}",
+    "ω": r"\ensuremath{\omega}",
+    "χ": r"\ensuremath{\chi}",
+    "Δ": r"\ensuremath{\Delta}",
+    "Λ": r"\ensuremath{\Lambda}",
+    "ℓ": r"\ensuremath{\ell}",
+    "–": "--",
+    "“": "``",
+    "”": "''",
+    "θ̇": r"\ensuremath{\dot\theta}",
+}
+_HEAD = r"""% A fragment: \input{report.tex} in a document with \usepackage{graphicx,booktabs,tabularx,amsmath}.
+% Figures are PDF files in figures/, their numbers CSV files of the same name. Thai needs XeLaTeX or LuaLaTeX.
+"""
+
+
+def write(report: Report, folder: Path) -> Path:
+    """Write report.tex and figures/; returns the path of report.tex."""
+    write_figures(report, folder, ("pdf", "svg"))
+    path = folder / "report.tex"
+    path.write_text(render(report), encoding="utf-8", newline="\n")
+    return path
+
+
+def render(report: Report) -> str:
+    """The fragment as text."""
+    words = report.words
+    parts = [_HEAD, f"\\section*{{{_text(report.title)}: {_text(report.subtitle)}}}", _text(report.lead), ""]
+    parts.append("\\begin{description}")
+    for fact in report.facts:
+        remark = f" {{\\small {_text(fact.remark)}}}" if fact.remark else ""
+        parts.append(f"\\item[{_text(fact.question)}] {_text(fact.answer)}.{remark}")
+    parts += ["\\end{description}", f"\\subsection*{{{_text(words('page.verdicts'))}}}"]
+    for verdict in report.verdicts:
+        title = f"\\paragraph{{{_text(verdict.title)}: {_text(verdict.label)}.}}"
+        parts += [f"{title} {_text(verdict.sentence)} {_text(verdict.remedy)}", ""]
+        if verdict.figure:
+            parts.append(_block(verdict.figure))
+    for section in report.sections:
+        parts.append(f"\\subsection*{{{_text(section.title)}}}")
+        parts += [_block(block) for block in section.blocks]
+    return "\n".join([*parts, _text(report.footer), ""])
+
+
+def _block(block: Block) -> str:
+    if isinstance(block, Figure):
+        width = "0.5" if block.key in ("period", "decay") else "0.95"
+        picture = f"\\includegraphics[width={width}\\linewidth]{{figures/{block.key}}}"
+        return f"\\begin{{figure}}[htbp]\\centering {picture}\n\\caption{{{_text(block.caption)}}}\\label{{fig:{block.key}}}\\end{{figure}}\n"
+    if isinstance(block, Equation):
+        return f"\\begin{{equation}}\n{block.latex}\n\\end{{equation}}\n"
+    if isinstance(block, Table):
+        rows = [" & ".join(_text(cell) for cell in row) + r" \\" for row in block.rows]
+        if block.mark is not None:
+            cells = (f"\\textbf{{{_text(cell)}}}" for cell in block.rows[block.mark])
+            rows[block.mark] = " & ".join(cells) + r" \\"
+        head = " & ".join(_text(cell) for cell in block.header) + r" \\"
+        shape = "l" * (len(block.header) - 1) + "X"
+        return "\n".join(
+            [
+                f"\\begin{{table}}[htbp]\\small\\caption{{{_text(block.caption)}}}\\label{{tab:{block.key}}}",
+                f"\\begin{{tabularx}}{{\\linewidth}}{{{shape}}}\\toprule",
+                head + r"\midrule",
+                *rows,
+                "\\bottomrule\\end{tabularx}\\end{table}\n",
+            ]
+        )
+    listed = "\n".join(f"\\item {_text(item)}" for item in block.items)
+    return _text(block.text) + (f"\n\\begin{{itemize}}\n{listed}\n\\end{{itemize}}" if listed else "") + "\n"
+
+
+def _text(text: str) -> str:
+    marks = {
+        "sub": r"\ensuremath{{_{{\mathrm{{{}}}}}}}",
+        "sup": r"\ensuremath{{^{{\mathrm{{{}}}}}}}",
+        "bold": r"\textbf{{{}}}",
+    }
+    out = []
+    for style, part in rich(text):
+        plain = "".join(_SPECIAL.get(c, c) for c in part)
+        out.append(marks[style].format(plain) if style in marks else plain)
+    return "".join(out)
