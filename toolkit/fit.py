@@ -41,7 +41,7 @@ class FitResult:
     success False comes with a `message` that says what happened and the remedy; nothing is raised.
     noise : sigma_rad used, where it came from, residual autocorrelation (rho1), inflation of the error bars.
     derived : name -> FittedParameter of what follows from the parameters (T0_s, Q, length_m …).
-    lmfit : lmfit's own MinimizerResult.
+    lmfit : lmfit's own MinimizerResult.    problem : what was solved (`toolkit.problem.Problem`), to solve it again.
     """
 
     model: str
@@ -64,6 +64,7 @@ class FitResult:
     cpu_s: float = 0.0
     warnings: tuple[str, ...] = ()
     lmfit: Any = None
+    problem: Any = field(default=None, repr=False, compare=False)
 
     @property
     def reduced_chi2(self) -> float:

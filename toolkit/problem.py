@@ -436,6 +436,7 @@ class Problem:
             method=motion.method,
             warnings=tuple(warnings),
             lmfit=found.lmfit,
+            problem=self,
         )
         return replace(result, derived=derive(result, self))
 
@@ -482,6 +483,7 @@ class Problem:
             message=message,
             noise={"sigma_rad": math.nan, "source": "none", "rho1": 0.0, "inflation": 1.0, "rss": math.inf},
             lmfit=found,
+            problem=self,
         )
 
 

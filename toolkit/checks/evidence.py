@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolkit.fit import FitResult, fit
+from toolkit.noise import Noise, measure_noise
 from toolkit.scene import Scene
 from toolkit.series import ThetaSeries
 
@@ -70,6 +71,84 @@ class Evidence:
         height = np.sin(theta / 2) ** 2 + (omega / (2 * omega_g)) ** 2
         amplitude = 2 * np.arcsin(np.sqrt(np.clip(height, 0, 1)))
         return amplitude if t_s is None else np.interp(t_s, self.series.t_s, amplitude)
+
+    def added(self, columns: np.ndarray) -> Added:
+        """What the best fit would gain from `columns` (n, k) of θ beside its own parameters, all linearised.
+
+        The noise is judged after the columns have taken their part: a real effect leaves white residuals behind, so its
+        own correlation does not count against it.
+        """
+        best = self.best
+        values = {name: p.value for name, p in best.parameters.items()}
+        _, by, _ = best.problem.predict(values, best.free)
+        weight = 1 / self.sigma_rad
+        basis = _basis(by * weight[:, None])
+        own = columns * weight[:, None]
+        own = own - basis @ (basis.T @ own)
+        size = np.linalg.norm(own, axis=0)
+        size = np.where(size > 0, size, np.inf)
+        gram = (own / size).T @ (own / size)
+        residual = best.residuals_rad * weight
+        residual = residual - basis @ (basis.T @ residual)
+        inverse = np.linalg.pinv(gram, rcond=1e-10)
+        coefficient = inverse @ ((own / size).T @ residual)
+        left = residual - (own / size) @ coefficient
+        reduced, _ = best.problem.reduce(values)
+        step = float(np.median(np.diff(self.series.t_s)))
+        known = self.series.sigma_theta_rad is not None
+        count = len(best.free) + columns.shape[1]
+        noise = measure_noise(left, self.sigma_rad, known, reduced["omega_g"], step, count)
+        inflation2 = max(noise.inflation**2, 1e-30)
+        gain = float(residual @ residual - left @ left) / inflation2
+        u = np.sqrt(np.diag(inverse) * inflation2) / size
+        return Added(gain, coefficient / size, u, noise)
+
+    def scale_gain(self) -> float:
+        """χ² that a common factor on all angles would take from the best fit (not corrected for the noise)."""
+        best = self.best
+        vertical = best.parameters["theta_offset"].value if "theta_offset" in best.parameters else 0.0
+        return float(self.step_gain((best.theta_rad - vertical)[:, None])[0])
+
+    def clock_gains(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """χ² that a jump of the clock, or a change of its rate, at each of `places` (k,) would take: (k,) each."""
+        t, omega = self.series.t_s[:, None], self.best.omega_rad_per_s[:, None]
+        later = t >= places[None, :]
+        return self.step_gain(omega * later), self.step_gain(omega * np.where(later, t - places[None, :], 0.0))
+
+    def places(self, count: int) -> np.ndarray:
+        """(count,) moments spread over the record, its ends left out."""
+        t = self.series.t_s
+        return np.linspace(t[0] + 0.06 * (t[-1] - t[0]), t[-1] - 0.06 * (t[-1] - t[0]), count)
+
+    def step_gain(self, columns: np.ndarray) -> np.ndarray:
+        """(k,) χ² that each of `columns` (n, k) alone would take from the best fit, not yet corrected for the noise."""
+        best = self.best
+        values = {name: p.value for name, p in best.parameters.items()}
+        _, by, _ = best.problem.predict(values, best.free)
+        weight = 1 / self.sigma_rad
+        basis = _basis(by * weight[:, None])
+        own = columns * weight[:, None]
+        own = own - basis @ (basis.T @ own)
+        size2 = np.sum(own**2, axis=0)
+        good = size2 > 1e-9 * np.sum((columns * weight[:, None]) ** 2, axis=0)
+        return np.where(good, (own.T @ (best.residuals_rad * weight)) ** 2 / np.where(good, size2, 1.0), 0.0)
+
+
+@dataclass(frozen=True)
+class Added:
+    """A linear addition to the best fit: its honest Δχ², its coefficients with their u, and the noise left."""
+
+    delta_chi2: float
+    coefficients: np.ndarray
+    sigmas: np.ndarray
+    noise: Noise
+
+
+def _basis(jacobian: np.ndarray) -> np.ndarray:
+    """Orthonormal columns that span what the fit's own parameters can do."""
+    size = np.linalg.norm(jacobian, axis=0)
+    u, s, _ = np.linalg.svd(jacobian[:, size > 0] / size[size > 0], full_matrices=False)
+    return np.asarray(u[:, s > 1e-7 * s[0]])
 
 
 def omega_g_of(result: FitResult) -> float:
