@@ -228,10 +228,21 @@ def _colour_of(picture: Any, turns: int) -> Callable[[str], Any]:
 # --- OpenCV and pictures ------------------------------------------------------------------------------------------
 
 
+def _opencv_capture(path: Path) -> Any:
+    """OpenCV's reader, told to keep its decoder's own complaints off the screen: ours is one line."""
+    import os
+
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    import cv2
+
+    cv2.setLogLevel(0)
+    return cv2.VideoCapture(str(path))
+
+
 def _open_opencv(path: Path) -> Video:
     import cv2
 
-    capture = cv2.VideoCapture(str(path))
+    capture = _opencv_capture(path)
     good, picture = capture.read()
     fps = capture.get(cv2.CAP_PROP_FPS)
     capture.release()
@@ -252,7 +263,7 @@ def _open_opencv(path: Path) -> Video:
 def _decode_opencv(path: Path) -> Iterator[Frame]:
     import cv2
 
-    capture = cv2.VideoCapture(str(path))
+    capture = _opencv_capture(path)
     try:
         first, index = None, 0
         while True:
