@@ -22,9 +22,9 @@ def check(evidence: Evidence) -> Finding | None:
     best = evidence.best
     if not best.success or len(evidence.series) < 40:
         return None
-    offset = best.parameters["theta_offset"] if "theta_offset" in best.parameters else None
+    offset = best.parameters.get("theta_offset")
     vertical = offset.value if offset is not None else 0.0
-    held = best.parameters["angle_scale"] if "angle_scale" in best.parameters else None
+    held = best.parameters.get("angle_scale")
     found = evidence.added((best.theta_rad - vertical)[:, None])
     scale, u, gain = float(found.coefficients[0]), float(found.sigmas[0]), found.delta_chi2
     if held is not None:  # already free within its prior: how far was it pulled?

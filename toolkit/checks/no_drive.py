@@ -52,6 +52,21 @@ def check(evidence: Evidence) -> Finding | None:
     values = {"frequency_hz": strongest, "amplitude_rad": amplitude, "over_swing": strongest / swing}
     taken = 1 - float(np.mean(_without(evidence, phase) ** 2)) / float(np.mean((best.residuals_rad) ** 2))
     if height > _CLEAR and (taken > _SMALLEST_SHARE or bool(best.noise["white"]) or found.delta_chi2 > _CLEAR):
+        if strongest < 0.5 * swing:
+            return Finding(
+                "no_drive",
+                FAILS,
+                where={"frequency_hz": strongest},
+                evidence=numbers,
+                sentence=(
+                    f"The zero of the angle moves slowly, {1000 * amplitude:.2g} mrad at {strongest:.3g} Hz: the camera or the support "
+                    "moved, or something pushes the bob at that frequency."
+                ),
+                remedy="fix the camera and the support; shield the pendulum from draught",
+                strength_sigma=math.sqrt(max(found.delta_chi2, 0.0)),
+                words_key="no_drive.slow",
+                words_values=values,
+            )
         return Finding(
             "no_drive",
             FAILS,
