@@ -69,8 +69,7 @@ def _trajectory(
         tension = energy = np.full(t.shape, np.nan)
         warnings += ("the scene gives no mass: tension and energy are left out",)
     else:
-        motion = equation.terms_at(parameters, t, theta, omega)
-        tension, energy = np.broadcast_to(motion.tension, t.shape), np.broadcast_to(motion.energy, t.shape)
+        tension, energy = equation.tension_and_energy(parameters, t, theta, omega)
         if t.size and tension.min() < 0:
             first = int(np.argmax(tension < 0))
             warnings += (

@@ -117,6 +117,36 @@ class Equation:
             symbols(number_functions(), state, values, self.effects, self.small_angle, self.formula_text)
         )
 
+    def tension_and_energy(
+        self, parameters: Mapping[str, float], t_s: np.ndarray, theta_rad: np.ndarray, omega_rad_per_s: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Tension (N) and energy (J) along a motion: as `terms_at`, without evaluating what does not enter them."""
+        values = dict(zip(self.parameters, self._values(parameters)))
+        mass, length, g = parameters["mass_kg"], values["length_m"], values["g_m_per_s2"]
+        values["mass_kg"] = mass
+        square = omega_rad_per_s * omega_rad_per_s
+        rise = theta_rad * theta_rad / 2 if self.small_angle else 1.0 - np.cos(theta_rad)
+        weight = mass * g * length
+        inertia, tension, energy = mass * length**2, (mass * length) * square + (mass * g) * (1.0 - rise), weight * rise
+        if self._observed:
+            functions, state = number_functions(), {"t": t_s, "theta": theta_rad, "omega": omega_rad_per_s}
+            seen = symbols(functions, state, values, self.effects, self.small_angle, self.formula_text)
+            for effect in self._observed:
+                term = effect.term(seen[effect.name])
+                inertia, tension, energy = inertia + term.inertia, tension + term.radial_force, energy + term.energy
+        return tension, energy + (inertia / 2) * square
+
+    @cached_property
+    def _observed(self) -> tuple[Effect, ...]:
+        """The effects that enter tension or energy."""
+        values = dict.fromkeys((*self.parameters, "mass_kg"), 1.0)
+        state = {"t": 0.1, "theta": 0.2, "omega": 0.3}
+        seen = symbols(number_functions(), state, values, self.effects, self.small_angle, self.formula_text)
+        nothing = Term()
+        terms = [(effect, effect.term(seen[effect.name])) for effect in self.effects if effect.name != "formula"]
+        kept = [e for e, t in terms if (t.inertia, t.radial_force, t.energy) != (nothing.inertia, 0, 0)]
+        return tuple(kept)
+
     def _motion(self, seen: dict[str, Symbols]) -> Motion:
         s = seen[""]
         torque, inertia, terms, harmonics = self._sum(seen)
@@ -450,7 +480,7 @@ class Equation:
         tolerance = max(0.3 * accuracy / (1.0 + 0.3 * span), _FLOOR)
         evaluations = steps = 0
         for _attempt in range(6):
-            order = min(max(int(1.5 - 0.55 * math.log(tolerance)), 6), taylor.MAX_ORDER)
+            order = min(max(int(1.5 - 0.7 * math.log(tolerance)), 6), taylor.MAX_ORDER)
             status, taken, found, error = taylor.integrate(
                 address, task.q, code.N_WORK, task.layout, task.columns, task.values, task.lengths, code.SWITCHES,
                 code.HOLDS, code.TIMED, task.rate, task.theta, task.w, task.start, task.tau, order, tolerance, _MOST_STEPS,

@@ -56,35 +56,52 @@ def _sample(c: Any, at: int, n: int, x: Any, count: int, out: Any, first: int) -
 @njit(cache=True)
 def _turning_point(W: Any, n: int, h: float, sign: float) -> tuple[float, bool]:
     """The first x in (0, h] where sign·w(x) falls below 0 (or −1), and whether w is against `sign` from the start."""
-    bound = 0.0
+    rest = 0.0
     power = 1.0
-    for k in range(1, n + 1):
+    for k in range(2, n + 1):
         power *= h
-        bound += abs(W[ROW + k]) * power
-    if abs(W[ROW]) > bound:
+        rest += abs(W[ROW + k]) * power
+    if abs(W[ROW]) > (abs(W[ROW + 1]) + rest) * h:
         return -1.0, False
+    if W[ROW] == 0.0 and abs(W[ROW + 1]) > rest:  # leaves rest and does not come back
+        return -1.0, sign * W[ROW + 1] < 0.0
     left = 0.0
-    parts = 8
+    parts = 6
     for i in range(1, parts + 1):
         right = h * i / parts
         if sign * _polynomial(W, ROW, n, right) < 0.0:
             if left == 0.0 and W[ROW] == 0.0:
                 # leaving a turning point: the motion is against the sign, or turns again within this part
-                near = sign * _polynomial(W, ROW, n, right * 1e-3)
-                if near < 0.0:
-                    return -1.0, True
                 left = right * 1e-3
-            for _ in range(200):
-                middle = 0.5 * (left + right)
-                if middle <= left or middle >= right:
-                    break
-                if sign * _polynomial(W, ROW, n, middle) < 0.0:
-                    right = middle
-                else:
-                    left = middle
-            return right, False
+                if sign * _polynomial(W, ROW, n, left) < 0.0:
+                    return -1.0, True
+            return _root(W, n, left, right, sign), False
         left = right
     return -1.0, False
+
+
+@njit(cache=True)
+def _root(W: Any, n: int, left: float, right: float, sign: float) -> float:
+    """The zero of w in a bracket, to the last digit: Newton's steps, halving where they leave the bracket."""
+    x = 0.5 * (left + right)
+    for _ in range(100):
+        value, slope = W[ROW + n], 0.0
+        for k in range(n - 1, -1, -1):
+            slope = slope * x + value
+            value = value * x + W[ROW + k]
+        if sign * value < 0.0:
+            right = x
+        else:
+            left = x
+        near = x - value / slope if slope != 0.0 else right
+        if not left < near < right:
+            near = 0.5 * (left + right)
+            if near <= left or near >= right:
+                break
+        if abs(near - x) <= 1e-16 * right:
+            return near
+        x = near
+    return x
 
 
 @njit(cache=True, fastmath={"contract"})
