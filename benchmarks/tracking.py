@@ -29,11 +29,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from toolkit import JobError, Scene, calibrate, render, track
 from toolkit.camera import effect_names
-from toolkit.camera.paint import cover_disc
-from toolkit.render import Studio, stage
-
-LUMA = np.array([0.299, 0.587, 0.114])  # BT.601
-LUMA_SCALE = 219 / 255  # of the limited range that video files use
+from toolkit.cost.tracking import cramer_rao_px
+from toolkit.render import stage
 
 
 @dataclass(frozen=True)
@@ -143,32 +140,6 @@ def _theta_sigmas(series: Any, theta: np.ndarray) -> tuple[float, float, float, 
     )
 
 
-def cramer_rao_px(studio: Studio) -> tuple[float, float]:
-    """Least possible σ per axis (median over frames) of any unbiased localiser of the film's luma, before its codec.
-
-    For noise σ per pixel and a bob of contrast C it is σ/(C √Σ(∂α/∂x)²), α being the blurred disc's coverage; for a
-    still disc of radius R and edge width s this is (σ/C) √(2 s/(√π R)). Rounding to levels counts as noise.
-    """
-    shoot = studio.shoot
-    contrast = abs(float(LUMA @ (np.array(shoot.wall_rgb) - np.array(shoot.bob_rgb)))) * LUMA_SCALE
-    level = float(np.mean([*shoot.wall_rgb, *shoot.bob_rgb]))
-    variance = shoot.read_sigma**2 + shoot.shot_sigma_at_white**2 * level / 255
-    noise = np.sqrt(variance * float(LUMA @ LUMA) * LUMA_SCALE**2 + 1 / 12)
-    bounds = []
-    for centres, shapes, _ in studio._exposures[:: max(1, len(studio._exposures) // 12)]:
-        row = []
-        for axis in np.eye(2):
-            moved = [cover_disc(centres + side * 1e-3 * axis, shapes, studio.sigma_px) for side in (-1, 1)]
-            (x0, y0, a, _), (x1, y1, b, _) = moved
-            if (x0, y0, a.shape) != (x1, y1, b.shape):
-                continue
-            row.append(noise / (contrast * np.sqrt(np.sum(((b - a) / 2e-3) ** 2))))
-        if len(row) == 2:
-            bounds.append(row)
-    x, y = np.median(np.array(bounds), axis=0)
-    return float(x), float(y)
-
-
 # --- random scenes ---------------------------------------------------------------------------------------------------
 
 Draw = Callable[[np.random.Generator, Mapping[str, Any]], dict[str, Any]]
@@ -230,7 +201,7 @@ DRAWS: dict[str, Draw] = {
     "duplicated_frames": lambda r, c: {"fraction": r.uniform(0.02, 0.15)},
     "variable_frame_rate": lambda r, c: {"jitter_s": r.uniform(0.05, 0.3) / c["fps"]},
     "codec": lambda r, c: {
-        "name": str(r.choice(["h264", "hevc", "mjpeg", "lossless"])),
+        "name": str(r.choice(["h264", "hevc", "mjpeg", "lossless"], p=[0.4, 0.15, 0.25, 0.2])),
         "bit_rate_bit_per_s": r.uniform(0.6e6, 6e6),
     },
 }  # fmt: skip
@@ -251,7 +222,7 @@ def random_scene(number: int) -> tuple[Scene, tuple[str, ...]]:
     bob = np.clip(wall - r.uniform(70, 150) + r.uniform(-25, 25, 3), 8, 247)
     fps = float(r.choice([29.97, 30, 60, 59.94]))
     camera: dict[str, Any] = {
-        "width_px": width, "height_px": height, "fps": fps, "duration_s": 5.0, "px_per_m": reach / length_m,
+        "width_px": width, "height_px": height, "fps": fps, "duration_s": 4.0, "px_per_m": reach / length_m,
         "pivot_px": list(pivot), "seed": number,
     }  # fmt: skip
     known = {**camera, "radius_px": radius, "reach_px": reach * np.sin(amplitude)}

@@ -224,14 +224,14 @@ class Studio:
         ends = [self._see(np.ones(captured.size), captured + dt)[0] for dt in (-half, 0, half)]
         paths = np.hypot(*(ends[1] - ends[0]).T) + np.hypot(*(ends[2] - ends[1]).T)
         fewest = 8 if shoot.exposure_s > 0 else 1  # at a turning point the path is short but the mean still shifts
-        self._exposures = []
+        self.exposures = []
         rows = []
         for t, path in zip(captured, paths):
             k = max(fewest, math.ceil(path / (0.8 * self.sigma_px)))
             moments = t + shoot.exposure_s * ((np.arange(k) + 0.5) / k - 0.5)
             centres, when = self._see(np.ones(k), moments)
             shapes, radii = self._shapes(when)
-            self._exposures.append((centres, shapes, when))
+            self.exposures.append((centres, shapes, when))
             pivot = self._see(np.zeros(1), np.array([t]))[0][0]
             rows.append(
                 (t + float(shoot.row_delay_s(centres[:, 1].mean())), *centres.mean(axis=0), radii.mean(), *pivot)
@@ -270,7 +270,7 @@ class Studio:
     def _visible(self, number: int) -> float:
         """Fraction of the bob's light that reaches the picture: inside it and before nothing (front patches)."""
         shoot = self.shoot
-        centres, shapes, _ = self._exposures[number]
+        centres, shapes, _ = self.exposures[number]
         reach = self._views[number].radius_px + np.ptp(centres, axis=0).max() + 5 * self.sigma_px
         view = self._views[number]
         inside = reach <= view.x_px <= shoot.width_px - 1 - reach and reach <= view.y_px <= shoot.height_px - 1 - reach
@@ -327,7 +327,7 @@ class Studio:
             along, half = np.linspace(0, 1, _STRING_POINTS), shoot.exposure_s / 2
             start, middle, end = (self._see(along, np.full(along.size, view.t_s + dt))[0] for dt in (-half, 0, half))
             lay_line(image, middle, end - start, shoot.string_width_px, self.sigma_px, self._light(shoot.string_rgb))
-        centres, shapes, when = self._exposures[number]
+        centres, shapes, when = self.exposures[number]
         colours = None
         if (look := shoot.look) is not None:
             thetas = self._theta(when)

@@ -96,10 +96,10 @@ def _encoder(codec: dict[str, Any], suffix: str) -> tuple[str, dict[str, str], s
     if name == "lossless" and suffix in (".mp4", ".mov"):
         return "libx264", {"qp": "0", "preset": "ultrafast", "g": interval}, "yuv444p"
     if name == "lossless":
-        return "ffv1", {}, "yuv444p"
+        return "ffv1", {"coder": "0", "context": "0"}, "yuv444p"
     if name == "mjpeg":
         return "mjpeg", {} if rated else {"qmin": "2", "qmax": "3"}, "yuvj420p"
-    options = {"g": interval, "preset": codec.get("preset", "veryfast" if name == "h264" else "ultrafast")}
+    options = {"g": interval, "preset": codec.get("preset", "superfast" if name == "h264" else "ultrafast")}
     if name == "h264":
         options["x264-params"] = "mbtree=0"  # with it, small pictures are not encoded the same way twice
     if name == "hevc":

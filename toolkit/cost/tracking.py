@@ -1,0 +1,428 @@
+"""Tracking: error against time per frame, ours and public peers on the same frames, beside what is physically possible.
+
+Clips of a plain pendulum are rendered here, with exact truth, at several resolutions and bit rates. Our trackers run as
+a user runs them (decoding and the search for the bob included). Peers get the decoded frames in memory, the bob's first
+position and radius, and a window about where it must be next: more help than a user has to give ours. Times are CPU times.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from toolkit.errors import JobError
+from toolkit.progress import Progress, silent
+from toolkit.render import Studio, Truth, render, stage
+from toolkit.scene import Scene
+
+LUMA = np.array([0.299, 0.587, 0.114])  # BT.601
+LUMA_SCALE = 219 / 255  # of the limited range that video files use
+OURS, PEER = "ours", "peer"
+_COLUMNS = (
+    "clip", "method", "kind", "rms_x_px", "rms_y_px", "spread_px", "std_of_error_over_sigma", "ok_fraction",
+    "us_per_frame", "decode_us_per_frame", "bound_px",
+)  # fmt: skip
+
+Window = tuple[int, int, np.ndarray]  # left, top, pixels
+Locate = Callable[[np.ndarray, float, float], tuple[float, float] | None]  # frame, expected x, y -> x, y
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One film: its name, its scene and how its file is stored."""
+
+    name: str
+    scene: Scene
+
+
+@dataclass(frozen=True)
+class Result:
+    """One method on one clip. Errors in px, rms per axis over found frames; `spread_px` is the rms over both axes after
+    the constant offset is removed; `std_of_error_over_sigma` only where the method states a σ."""
+
+    clip: str
+    method: str
+    kind: str
+    rms_x_px: float
+    rms_y_px: float
+    spread_px: float
+    std_of_error_over_sigma: float
+    ok_fraction: float
+    us_per_frame: float
+    decode_us_per_frame: float
+    bound_px: float
+
+
+def measure(folder: str | Path, quick: bool = False, progress: Progress = silent) -> str:
+    """Render, track and compare; write tracking.csv, tracking.txt and tracking.png/.svg into `folder`; return the text."""
+    folder = Path(folder)
+    results = measure_tracking(quick, progress)
+    with (folder / "tracking.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(_COLUMNS)
+        for r in results:
+            row = [getattr(r, column) for column in _COLUMNS]
+            writer.writerow([v if isinstance(v, str) else f"{v:.4g}" for v in row])
+    text = describe(results, quick)
+    (folder / "tracking.txt").write_text(text + "\n", encoding="utf-8")
+    _draw(results, folder / "tracking")
+    return text
+
+
+def measure_tracking(quick: bool = False, progress: Progress = silent) -> list[Result]:
+    """Every method on every clip."""
+    from toolkit.trackers import tracker_names
+    from toolkit.video import open_video
+
+    chosen = clips(quick)
+    results: list[Result] = []
+    steps = len(chosen) * (len(tracker_names()) + len(PEERS) + 2)
+    done = 0
+
+    def tell(what: str) -> None:
+        nonlocal done
+        progress(what, done / steps)
+        done += 1
+
+    with tempfile.TemporaryDirectory() as scratch:
+        for number, clip in enumerate(chosen):
+            tell(f"{clip.name}: rendering")
+            film = Path(scratch) / f"clip{number}.mkv"
+            truth = render(clip.scene, film)
+            bound = float(np.hypot(*cramer_rao_px(stage(clip.scene))) / math.sqrt(2))
+            tell(f"{clip.name}: decoding")
+            decode_s = min(_decoding_s(open_video(film)) for _ in range(2))
+            common = (clip.name, 1e6 * decode_s / truth.frame.size, bound)
+            for name in tracker_names():
+                tell(f"{clip.name}: {name}")
+                results += _run_ours(film, name, truth, common, warm=number == 0)
+            keep = [frame.copy() for frame in _lumas(open_video(film))]
+            for name in PEERS:
+                tell(f"{clip.name}: {name}")
+                results += _run_peer(name, keep, truth, common)
+            film.unlink()
+    progress("writing", 1.0)
+    return results
+
+
+def clips(quick: bool = False) -> tuple[Clip, ...]:
+    """The films: resolution and radius, bit rate, and one with a shutter open for half a frame."""
+    lossless = {"name": "lossless"}
+    sizes = {"480p": (640, 480, 14.0), "720p": (1280, 720, 20.0), "1080p": (1920, 1080, 30.0)}
+
+    def clip(size: str, label: str, codec: dict[str, Any], **effects: Any) -> Clip:
+        width, height, radius = sizes[size]
+        reach = 0.72 * height
+        table = {
+            "pendulum": {"mass_kg": 0.1, "length_m": 0.5, "bob_radius_m": 0.5 * radius / reach},
+            "release": {"theta0_rad": 0.35},
+            "effects": {"linear_drag": {"k_d_kg_per_s": 1e-3}},
+            "camera": {
+                "width_px": width, "height_px": height, "fps": 60, "duration_s": 1.8 if quick else 5.0, "seed": 11,
+                "px_per_m": reach / 0.5, "pivot_px": [width / 2 + 0.3, 0.08 * height + 0.4],
+                "sensor_noise": {"read_sigma": 2.0}, "codec": codec, **effects,
+            },
+        }  # fmt: skip
+        return Clip(f"{size} {label}", Scene.from_dict(table))
+
+    def rated(megabit: float) -> dict[str, Any]:
+        return {"name": "h264", "bit_rate_bit_per_s": megabit * 1e6}
+
+    first = (clip("480p", "2 Mbit/s", rated(2)), clip("720p", "8 Mbit/s", rated(8)))
+    if quick:
+        return first
+    return (
+        *first,
+        clip("720p", "lossless", lossless),
+        clip("720p", "1 Mbit/s", rated(1)),
+        clip("720p", "8 Mbit/s, half-frame blur", rated(8), motion_blur={"exposure_s": 0.5 / 60}),
+        clip("1080p", "12 Mbit/s", rated(12)),
+    )
+
+
+def cramer_rao_px(studio: Studio) -> tuple[float, float]:
+    """Least possible σ in px, along x and y, of any unbiased localiser of the film's luma before its codec.
+
+    Independent noise σ on every pixel and a bob of contrast C on an even wall: σ/(C √Σ(∂α/∂x)²), α being the coverage
+    of the (blurred) disc; for a still disc of radius R and edge width s this is (σ/C) √(2 s/(√π R)). Rounding to whole
+    levels counts as noise. The median over the film.
+    """
+    from toolkit.camera.paint import cover_disc
+
+    shoot = studio.shoot
+    contrast = abs(float(LUMA @ (np.array(shoot.wall_rgb) - np.array(shoot.bob_rgb)))) * LUMA_SCALE
+    level = float(np.mean([*shoot.wall_rgb, *shoot.bob_rgb]))
+    variance = shoot.read_sigma**2 + shoot.shot_sigma_at_white**2 * level / 255
+    noise = math.sqrt(variance * float(LUMA @ LUMA) * LUMA_SCALE**2 + 1 / 12)
+    bounds = []
+    for centres, shapes, _ in studio.exposures[:: max(1, len(studio.exposures) // 12)]:
+        row = []
+        for axis in np.eye(2):
+            (x0, y0, a, _), (x1, y1, b, _) = (
+                cover_disc(centres + side * 1e-3 * axis, shapes, studio.sigma_px) for side in (-1, 1)
+            )
+            if (x0, y0, a.shape) == (x1, y1, b.shape):  # else a pixel row came in: this film has other frames
+                row.append(noise / (contrast * math.sqrt(np.sum(((b - a) / 2e-3) ** 2))))
+        if len(row) == 2:
+            bounds.append(row)
+    x, y = np.median(np.array(bounds), axis=0)
+    return float(x), float(y)
+
+
+def _timed(run: Callable[[], Any]) -> tuple[float, Any]:
+    began = time.process_time()
+    value = run()
+    return time.process_time() - began, value
+
+
+def _decoding_s(video: Any) -> float:
+    return _timed(lambda: sum(1 for _ in _lumas(video)))[0]
+
+
+def _lumas(video: Any) -> Iterator[np.ndarray]:
+    for frame in video:
+        yield frame.luma
+
+
+def _run_ours(film: Path, name: str, truth: Truth, common: tuple[str, float, float], warm: bool) -> list[Result]:
+    from toolkit.track import track
+
+    try:
+        if warm:
+            track(film, localiser=name)  # compiles, once on a machine
+        seconds, found = _timed(lambda: track(film, localiser=name))
+    except JobError:
+        return []
+    ok = found.ok
+    dx, dy = (found.x_px - truth.x_px[found.frame])[ok], (found.y_px - truth.y_px[found.frame])[ok]
+    std = float(np.std(np.concatenate([dx / found.sigma_x_px[ok], dy / found.sigma_y_px[ok]])))
+    return [_result(f"pendulab {name}", OURS, dx, dy, std, ok.mean(), 1e6 * seconds / truth.frame.size, common)]
+
+
+def _result(
+    name: str,
+    kind: str,
+    dx: np.ndarray,
+    dy: np.ndarray,
+    std: float,
+    ok: float,
+    us: float,
+    common: tuple[str, float, float],
+) -> Result:
+    clip, decode_us, bound = common
+    rms = [float(np.sqrt(np.mean(d**2))) for d in (dx, dy)]
+    spread = math.sqrt((np.var(dx) + np.var(dy)) / 2)
+    return Result(clip, name, kind, rms[0], rms[1], spread, std, float(ok), us, decode_us, bound)
+
+
+# --- peers -----------------------------------------------------------------------------------------------------------
+
+
+def _run_peer(name: str, frames: list[np.ndarray], truth: Truth, common: tuple[str, float, float]) -> list[Result]:
+    radius = float(truth.radius_px[0])
+    try:
+        locate = PEERS[name](frames, float(truth.x_px[0]), float(truth.y_px[0]), radius)
+    except ImportError:
+        return []  # an extra that is not installed
+
+    def follow() -> list[tuple[float, float] | None]:
+        path: list[tuple[float, float] | None] = []
+        recent = [(float(truth.x_px[0]), float(truth.y_px[0]))] * 2
+        for frame in frames:
+            (x0, y0), (x1, y1) = recent
+            found = locate(frame, 2 * x1 - x0, 2 * y1 - y0)
+            path.append(found)
+            recent = [recent[1], found or (2 * x1 - x0, 2 * y1 - y0)]
+        return path
+
+    seconds, path = _timed(follow)
+    found = np.array([p is not None for p in path])
+    if not found.any():
+        return []
+    where = np.array([p for p in path if p is not None])
+    dx, dy = where[:, 0] - truth.x_px[found], where[:, 1] - truth.y_px[found]
+    near = np.hypot(dx, dy) < radius  # beyond that it follows something else
+    if near.mean() < 0.2:
+        return []
+    return [
+        _result(name, PEER, dx[near], dy[near], math.nan, near.sum() / len(path), 1e6 * seconds / len(path), common)
+    ]
+
+
+def _window(frame: np.ndarray, x: float, y: float, half: float) -> Window:
+    left = int(np.clip(x - half, 0, frame.shape[1] - 2 * half - 1))
+    top = int(np.clip(y - half, 0, frame.shape[0] - 2 * half - 1))
+    return left, top, frame[top : top + 2 * int(half) + 1, left : left + 2 * int(half) + 1]
+
+
+def _template(frames: list[np.ndarray], x: float, y: float, radius: float) -> Locate:
+    """OpenCV's matchTemplate (squared differences), the first frame as template, a parabola through the minimum."""
+    import cv2
+
+    half = math.ceil(radius + 4)
+    cx, cy = round(x), round(y)
+    mask = np.ascontiguousarray(frames[0][cy - half : cy + half + 1, cx - half : cx + half + 1])
+
+    def peak(a: float, b: float, c: float) -> float:
+        bend = a - 2 * b + c
+        return 0.0 if bend == 0 else 0.5 * (a - c) / bend
+
+    def locate(frame: np.ndarray, gx: float, gy: float) -> tuple[float, float] | None:
+        left, top, window = _window(frame, gx, gy, half + 12)
+        score = cv2.matchTemplate(window, mask, cv2.TM_SQDIFF)
+        _, _, (i, j), _ = cv2.minMaxLoc(score)
+        if not (0 < i < score.shape[1] - 1 and 0 < j < score.shape[0] - 1):
+            return None
+        sx = peak(*(float(v) for v in score[j, i - 1 : i + 2]))
+        sy = peak(*(float(v) for v in score[j - 1 : j + 2, i]))
+        return left + i + half + sx + x - cx, top + j + half + sy + y - cy
+
+    return locate
+
+
+def _hough(frames: list[np.ndarray], x: float, y: float, radius: float) -> Locate:
+    """OpenCV's HoughCircles in a window, the circle nearest to where the bob must be."""
+    import cv2
+
+    def locate(frame: np.ndarray, gx: float, gy: float) -> tuple[float, float] | None:
+        left, top, window = _window(frame, gx, gy, 2 * radius + 12)
+        smooth = cv2.GaussianBlur(np.ascontiguousarray(window), (5, 5), 1)
+        found = cv2.HoughCircles(
+            smooth, cv2.HOUGH_GRADIENT, 1, radius, param1=80, param2=10,
+            minRadius=int(0.8 * radius), maxRadius=math.ceil(1.2 * radius),
+        )  # fmt: skip
+        if found is None:
+            return None
+        circles = np.asarray(found).reshape(-1, 3)
+        best = circles[np.argmin(np.hypot(circles[:, 0] + left - gx, circles[:, 1] + top - gy))]
+        return left + float(best[0]), top + float(best[1])
+
+    return locate
+
+
+def _mean_shift(frames: list[np.ndarray], x: float, y: float, radius: float) -> Locate:
+    """OpenCV's meanShift on the back-projection of the bob's histogram, then that window's centroid."""
+    import cv2
+
+    half = round(0.6 * radius)
+    cx, cy = round(x), round(y)
+    inside = np.ascontiguousarray(frames[0][cy - half : cy + half + 1, cx - half : cx + half + 1])
+    histogram = cv2.calcHist([inside], [0], None, [32], [0, 256])
+    cv2.normalize(histogram, histogram, 0, 255, cv2.NORM_MINMAX)
+    size = 2 * math.ceil(radius) + 5
+
+    def locate(frame: np.ndarray, gx: float, gy: float) -> tuple[float, float] | None:
+        left, top, window = _window(frame, gx, gy, 2 * radius + 12)
+        likely = cv2.calcBackProject([np.ascontiguousarray(window)], [0], histogram, [0, 256], 1)
+        start = (max(0, round(gx - left - size / 2)), max(0, round(gy - top - size / 2)), size, size)
+        _, (i, j, w, h) = cv2.meanShift(likely, start, (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.1))
+        m = cv2.moments(likely[j : j + h, i : i + w])
+        return None if m["m00"] == 0 else (left + i + m["m10"] / m["m00"], top + j + m["m01"] / m["m00"])
+
+    return locate
+
+
+def _trackpy(frames: list[np.ndarray], x: float, y: float, radius: float) -> Locate:
+    """trackpy.locate on a dark feature in a window, the feature nearest to where the bob must be."""
+    import trackpy
+
+    trackpy.quiet()
+    diameter = 2 * math.ceil(radius + 2) + 1
+
+    def locate(frame: np.ndarray, gx: float, gy: float) -> tuple[float, float] | None:
+        left, top, window = _window(frame, gx, gy, 2 * radius + 14)
+        found = trackpy.locate(255 - window, diameter, engine="numba")
+        if not len(found):
+            return None
+        at = np.argmin(np.hypot(found.x + left - gx, found.y + top - gy))
+        return left + float(found.x.iloc[at]), top + float(found.y.iloc[at])
+
+    return locate
+
+
+PEERS: dict[str, Callable[[list[np.ndarray], float, float, float], Locate]] = {
+    "OpenCV template": _template,
+    "OpenCV Hough": _hough,
+    "OpenCV mean-shift": _mean_shift,
+    "trackpy": _trackpy,
+}
+
+
+# --- what is written ---------------------------------------------------------------------------------------------------
+
+
+def describe(results: list[Result], quick: bool) -> str:
+    """The table as text."""
+    lines = [
+        "Tracking: error against time per frame" + (" (quick: short clips)" if quick else ""),
+        "rms in px per axis against the rendered truth; spread: after the constant offset is removed; bound: Cramér–Rao",
+        "of the luma before the codec. Time is CPU time a frame: ours with decoding and search, peers without both.",
+        "",
+    ]
+    for clip in dict.fromkeys(r.clip for r in results):
+        group = [r for r in results if r.clip == clip]
+        lines += [
+            f"{clip}: decoding alone {group[0].decode_us_per_frame:.0f} µs a frame, bound {group[0].bound_px:.4f} px",
+            f"  {'method':22s} {'rms x':>8s} {'rms y':>8s} {'spread':>8s} {'error/σ':>8s} {'found':>7s} {'µs/frame':>9s}  of decoding's rate",
+        ]
+        for r in group:
+            total = r.us_per_frame + (r.decode_us_per_frame if r.kind == PEER else 0)
+            std = f"{r.std_of_error_over_sigma:8.2f}" if np.isfinite(r.std_of_error_over_sigma) else "       –"
+            lines.append(
+                f"  {r.method:22s} {r.rms_x_px:8.4f} {r.rms_y_px:8.4f} {r.spread_px:8.4f} {std} {r.ok_fraction:7.1%} "
+                f"{r.us_per_frame:9.0f}  {r.decode_us_per_frame / total:.2f}"
+            )
+        lines.append("")
+    return "\n".join(lines).rstrip()
+
+
+def _draw(results: list[Result], path: Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    names = list(dict.fromkeys(r.clip for r in results))
+    columns = min(3, len(names))
+    rows = math.ceil(len(names) / columns)
+    figure = Figure(figsize=(4.6 * columns, 3.9 * rows + 0.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    methods = list(dict.fromkeys(r.method for r in results))
+    marks = "osDv^<>Pp*hX"
+    colours = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999933", "#882255")
+    for panel, clip in zip(panels, names):
+        group = [r for r in results if r.clip == clip]
+        for r in group:
+            total = r.us_per_frame + (r.decode_us_per_frame if r.kind == PEER else 0)
+            i = methods.index(r.method)
+            panel.loglog(
+                total / 1e3, math.hypot(r.rms_x_px, r.rms_y_px) / math.sqrt(2), marks[i % len(marks)],
+                color=colours[i % len(colours)], markersize=9 if r.kind == OURS else 7,
+                markerfacecolor=None if r.kind == OURS else "white", label=r.method,
+            )  # fmt: skip
+        panel.axhline(group[0].bound_px, color="0.4", linestyle="--", linewidth=1)
+        panel.text(0.98, group[0].bound_px * 1.06, "Cramér–Rao bound", ha="right", fontsize=8, color="0.35",
+                   transform=panel.get_yaxis_transform())  # fmt: skip
+        panel.axvline(group[0].decode_us_per_frame / 1e3, color="0.4", linestyle=":", linewidth=1)
+        panel.text(group[0].decode_us_per_frame / 1e3 * 1.03, 0.98, "decoding alone", va="top", rotation=90, fontsize=8,
+                   color="0.35", transform=panel.get_xaxis_transform())  # fmt: skip
+        panel.set_title(clip, fontsize=10)
+        panel.set_xlabel("CPU time a frame, decoding included (ms)")
+        panel.grid(True, which="both", color="0.92")
+    for panel in panels[len(names) :]:
+        panel.set_visible(False)
+    for panel in panels[::columns]:
+        panel.set_ylabel("rms error per axis (px)")
+    handles = {
+        h.get_label(): h for panel in panels for h in panel.get_lines() if not str(h.get_label()).startswith("_")
+    }
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=min(4, len(handles)), fontsize=9)
+    for suffix in (".png", ".svg"):
+        figure.savefig(path.with_suffix(suffix), dpi=130)
