@@ -10,6 +10,7 @@ from toolkit.registry import load_part, part_names
 if TYPE_CHECKING:
     from toolkit.series import ThetaSeries
 
+_FEWEST = 4
 _NOT_PARTS = frozenset({"series_format", "table_text", "columns", "arc"})
 
 
@@ -36,7 +37,10 @@ def read_series(path: str | Path) -> ThetaSeries:
     formats = sorted((load_format(name) for name in format_names()), key=lambda f: (f.order, f.name))
     for kind in formats:
         if kind.recognises(look):
-            return kind.read(Path(path))
+            series: ThetaSeries = kind.read(Path(path))
+            if len(series) < _FEWEST:
+                raise JobError(f"{path} holds {len(series)} points of θ(t); at least {_FEWEST} are needed for a swing")
+            return series
     raise JobError(f"{path} is not a table of θ(t) that pendulab knows; export it as CSV with columns t_s,theta_rad")
 
 

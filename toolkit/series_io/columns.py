@@ -102,7 +102,7 @@ def understand(name: str) -> Column:
     sigma = plain.endswith(("'", "′", "’"))
     plain = plain.rstrip("'′’")
     outside = re.sub(r"[(\[].*", " ", plain)
-    words = [w for w in re.split(r"[^\wθϑσφωδ±]+|_", outside) if w]
+    words = [w for w in re.split(r"[^\w\u0e00-\u0e7f±]+|_", outside) if w]
     if words and len(words[0]) > 1 and words[0][0] in "σδ±":  # σθ, Δt
         words = [words[0][0], words[0][1:], *words[1:]]
     sigma = sigma or bool(set(words) & _SIGMA_WORDS)
@@ -123,7 +123,7 @@ def understand(name: str) -> Column:
 
 
 def _scale(name: str, units: dict[float, str]) -> float | None:
-    words = re.split(r"[^\w°ºµμ]+|_", name)
+    words = re.split(r"[^\w\u0e00-\u0e7f°ºµμ]+|_", name)
     for scale, spellings in units.items():
         known = spellings.split()
         if any(word in known for word in words[1:]) or any(s in name for s in known if s in "°º" or s[0] > "ก"):

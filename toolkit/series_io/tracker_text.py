@@ -158,8 +158,8 @@ def _theta(
     """Angle from the downward vertical in rad, from the best column there is."""
     for name in ("θ", "theta"):
         if name in mine and np.isfinite(mine[name]).any():
-            scale = angle_scale_by_size(mine[name], path, warnings)
-            log.append(f"The angle is Tracker's column {name!r}.")
+            scale = _scale_by_positions(mine, name) or angle_scale_by_size(mine[name], path, warnings)
+            log.append(f"The angle is Tracker's column {name!r}, in {'radians' if scale == 1 else 'degrees'}.")
             return mine[name] * scale
     if "x" in mine and "y" in mine:
         try:
@@ -178,6 +178,23 @@ def _theta(
     raise JobError(f"{path} holds x without y; export t with θ, or with both x and y")
 
 
+def _scale_by_positions(mine: dict[str, np.ndarray], name: str) -> float | None:
+    """The unit of an angle column that stands beside x and y: the one in which both swing as wide; None without them."""
+    if "x" not in mine or "y" not in mine:
+        return None
+    good = np.isfinite(mine[name]) & np.isfinite(mine["x"]) & np.isfinite(mine["y"])
+    if np.sum(good) < 4:
+        return None
+    swing = float(np.std(np.unwrap(np.arctan2(mine["x"][good], -mine["y"][good]))))
+    spread = float(np.std(mine[name][good]))
+    if not (swing > 0 and spread > 0):
+        return None
+    for scale in (1.0, np.pi / 180):
+        if 0.5 < spread * scale / swing < 2:
+            return float(scale)
+    return None
+
+
 def _from_polar(polar_rad: np.ndarray, log: list[str]) -> np.ndarray:
     """From Tracker's position angle (from the +x axis, counter-clockwise) to θ from the axis about which it swings."""
     good = np.isfinite(polar_rad)
@@ -190,12 +207,16 @@ def _from_polar(polar_rad: np.ndarray, log: list[str]) -> np.ndarray:
 
 
 def write(series: ThetaSeries, path: Path) -> None:
-    """A one-track export as Tracker writes it: t and θ, degrees, tab-delimited with a trailing tab, 12 digits.
+    """A one-track export as Tracker writes it: t, x, y, θ in degrees, tab-delimited with a trailing tab, 13 digits.
 
-    σ has no place in this format and is not written.
+    x and y are in metres about the pivot, with the length from `meta` (1 m where it is not known); they tell a reader
+    that θ is in degrees. σ has no place in this format and is not written.
     """
-    rows = [f"{t:.12E}\t{angle:.12E}\t" for t, angle in zip(series.t_s, np.degrees(series.theta_rad))]
-    path.write_text("\n".join(["\tmass A\t", "t\tθ\t", *rows, ""]), encoding="utf-8", newline="\n")
+    length = float(series.meta.get("length_m", 1.0))
+    x, y = length * np.sin(series.theta_rad), -length * np.cos(series.theta_rad)
+    columns = (series.t_s, x, y, np.degrees(series.theta_rad))
+    rows = ["".join(f"{value:.12E}\t" for value in row) for row in zip(*columns)]
+    path.write_text("\n".join(["\tmass A\t\t\t", "t\tx\ty\tθ\t", *rows, ""]), encoding="utf-8", newline="\n")
 
 
 FORMAT = SeriesFormat("tracker_text", (".txt",), "Tracker's text export", _recognises, read, write, order=15)

@@ -213,16 +213,15 @@ def _spread(points: list[tuple[int, Element]], path: Path) -> float:
 
 
 def _times(panel: Element, frames: np.ndarray, path: Path) -> np.ndarray:
-    """Times in s: start time + (frame − start frame)·delta_t."""
+    """Times in s: start time + (frame − first frame with a position)·delta_t; the clip before it is not part of the record."""
     clip, control = _object(panel, "videoclip"), _object(panel, "clipcontrol")
     if control is None or not _text(control, "delta_t"):
         raise JobError(f"{path} gives no time a frame (clipcontrol, delta_t); save the project with its video clip")
     step_ms = _number(control, "delta_t", path)
     if not step_ms > 0:
         raise JobError(f"{path}: the time a frame is {step_ms:g} ms; set the frame rate in Tracker")
-    start_frame = _number(clip, "startframe", path, default=0.0) if clip is not None else 0.0
     start_ms = _number(clip, "starttime", path, default=0.0) if clip is not None else 0.0
-    return (start_ms + (frames - start_frame) * step_ms) / 1000
+    return (start_ms + (frames - frames[0]) * step_ms) / 1000
 
 
 def _is_scaled(panel: Element) -> bool:
