@@ -90,7 +90,7 @@ class _Writer:
             self.inner.clear()
         self.analytic = bool(jet)
         terms = self.terms()
-        parts = [f'"""{self.header}"""', "import math", self.facts(), self.coefficients(), self.partials()]
+        parts = [f'r"""{self.header}"""', "import math", self.facts(), self.coefficients(), self.partials()]
         return "\n\n".join([*parts, jet, terms]) + "\n"
 
     def inner_index(self, expression: Any) -> int:
