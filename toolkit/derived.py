@@ -33,6 +33,9 @@ def propagate(result: FitResult, function: Callable[[dict[str, float]], float], 
 def derive(result: FitResult, problem: Problem) -> dict[str, FittedParameter]:
     """T0, omega_g, Q and log_decrement at θ₀, damping rates, and the equivalent length; what applies to the model.
 
+    `equivalent_alpha_d` (and `equivalent_k_d` where the mass is known) is the linear rate that takes the same energy in a
+    cycle at θ₀; `decay_time` is its inverse. `g_from_length` = ω_g² ℓ with the scene's ℓ, where the fit freed it.
+
     Q = ω_g/(2 α_eq) and log_decrement = 2π α_eq/ω_g with the equivalent linear rate
     α_eq = α_d + (4/3π) β ω_g θ₀ + 2 μ/(π ω_g θ₀) (physics: averaged energy loss of a cycle at amplitude θ₀).
     """
@@ -57,12 +60,19 @@ def derive(result: FitResult, problem: Problem) -> dict[str, FittedParameter]:
         derived["omega_g"] = propagate(result, omega, "rad/s")
     if "length" not in result.parameters:
         derived["equivalent_length"] = propagate(result, lambda v: gravity / omega(v) ** 2, "m")
+    elif "length" in result.free and problem.scene.pendulum.length_m is not None:
+        given = problem.scene.pendulum.length_m
+        derived["g_from_length"] = propagate(result, lambda v: omega(v) ** 2 * given, "m/s^2")
     for name, coefficient, unit in (("k_d", "alpha_d", "1/s"), ("c", "beta", "1"), ("torque", "mu", "1/s^2")):
         if name in result.parameters:
             derived[coefficient] = propagate(result, _pick(problem, coefficient), unit)
     if problem.model.drags and rate({n: p.value for n, p in result.parameters.items()}) > 0:
         derived["Q"] = propagate(result, lambda v: omega(v) / (2 * rate(v)) if rate(v) else math.inf, "1")
         derived["log_decrement"] = propagate(result, lambda v: 2 * math.pi * rate(v) / omega(v), "1")
+        derived["equivalent_alpha_d"] = propagate(result, rate, "1/s")
+        if problem.scene.pendulum.mass_kg is not None:
+            twice = 2 * problem.scene.pendulum.mass_kg
+            derived["equivalent_k_d"] = propagate(result, lambda v: twice * rate(v), "kg/s")
         if "alpha_d" in problem.model.drags:
             derived["decay_time"] = propagate(result, lambda v: 1 / rate(v) if rate(v) else math.inf, "s")
     return {name: p for name, p in derived.items() if math.isfinite(p.value)}

@@ -175,6 +175,58 @@ class Problem:
         best = min(attempts, key=lambda a: a.cost)
         return self._report(self._bounded(best, {**best.values, **start}))
 
+    def with_input(self, name: str, change: float) -> Problem:
+        """The same problem with an input moved: mass, length, g, bob_radius (SI), vertical (rad), angle_scale and
+        time_scale (relative)."""
+        scene, series, values = self.scene, self.series, dict(self.values)
+        pendulum = scene.pendulum
+        if name == "mass" and pendulum.mass_kg is not None:
+            scene = scene.with_(pendulum=replace(pendulum, mass_kg=pendulum.mass_kg + change))
+        elif name == "length" and pendulum.length_m is not None:
+            scene = scene.with_(pendulum=replace(pendulum, length_m=pendulum.length_m + change))
+            values["length"] = pendulum.length_m + change
+        elif name == "bob_radius" and pendulum.bob_radius_m is not None:
+            scene = scene.with_(pendulum=replace(pendulum, bob_radius_m=pendulum.bob_radius_m + change))
+        elif name == "g":
+            g = scene.environment.gravity_m_per_s2 + change
+            scene = scene.with_(environment=replace(scene.environment, g_m_per_s2=g, latitude_deg=None))
+        elif name == "angle_scale":
+            series = replace(series, theta_rad=series.theta_rad * (1 + change))
+        elif name == "time_scale":
+            series = replace(series, t_s=series.t_s * (1 + change))
+        elif name == "vertical":
+            series = replace(series, theta_rad=series.theta_rad + change)
+        else:
+            raise UsageError(f"no input {name!r} here")
+        model = load_model(self.model.name).within(scene)
+        return replace(self, scene=scene, series=series, values=values, model=model)
+
+    def normal_inverse(self, result: FitResult) -> np.ndarray:
+        """(k, k) inverse of the normal matrix JᵀJ/σ² + priors at a fit: how the parameters follow the data."""
+        values = {name: p.value for name, p in result.parameters.items()}
+        _, by, _ = self.predict(values, self.free)
+        sigma = self.sigma if self.sigma_known else self.sigma * float(result.noise["sigma_rad"])
+        jacobian = by / sigma[:, None]
+        prior = np.array([1 / self.priors[n][1] ** 2 if n in self.priors else 0.0 for n in self.free])
+        scale = 1 / np.sqrt(np.sum(jacobian**2, axis=0) + prior)
+        scaled = jacobian * scale
+        inverse = np.linalg.pinv(scaled.T @ scaled + np.diag(prior * scale**2), rcond=1e-15, hermitian=True)
+        return np.asarray(inverse * np.outer(scale, scale))
+
+    def cost_at(self, values: Mapping[str, float], free: tuple[str, ...]) -> float:
+        """Weighted sum of squares (priors included) at `values`, or the least over `free` from there; inf where none."""
+        if free:
+            found = self._descend(values, free)
+            return math.inf if found is None else found.cost
+        residual, _ = self._residuals(values, (), self.series.theta_rad, 1 / self.sigma)
+        cost = float(residual @ residual)
+        return cost if cost < _BAD else math.inf
+
+    def values_at_best(self, start: Mapping[str, float]) -> dict[str, float] | None:
+        """Parameter values of the best fit from `start`, drags ≥ 0, without error bars; None where it fails."""
+        found = self._descend({**self.values, **start}, self.free)
+        return None if found is None else self._bounded(found, found.values).values
+
     def _starts(self, start: Mapping[str, float]) -> Iterator[dict[str, float]]:
         """First the guess (with what is given in its place), then others, each cheaper to compute than a fit."""
         given = {name: value for name, value in start.items() if name in self.free}
