@@ -195,12 +195,11 @@ def simulate(
 ) -> None:
     """Solve the equation of motion of SCENE: t, θ, θ̇, tension, energy as CSV."""
     import numpy as np
-    from toolkit.simulate import simulate as solve
-    from toolkit.simulate import write_trajectory_csv
 
     from toolkit.errors import UsageError
     from toolkit.output import whole_file
     from toolkit.scene import Scene
+    from toolkit.simulate import simulate as solve
 
     known = Scene.from_toml(scene)
     length = duration_s if duration_s is not None else (known.camera.duration_s if known.camera else 10.0)
@@ -213,7 +212,7 @@ def simulate(
         progress("solving", 0.0)
         trajectory = solve(known, np.arange(round(length * rate) + 1) / rate, accuracy_rad=accuracy)
         with whole_file(out) as unfinished:
-            write_trajectory_csv(trajectory, unfinished)
+            trajectory.to_csv(unfinished)
     cost = trajectory.cost
     typer.echo(
         f"route: {trajectory.method}; {1e3 * cost.cpu_s:.3g} ms of CPU, {1e3 * cost.compile_s:.3g} ms of compiling"
@@ -233,7 +232,6 @@ def render(
 ) -> None:
     """Film SCENE: a synthetic video with its exact truth in a side-car."""
     from toolkit.render import render as film
-
     from toolkit.scene import Scene
 
     with _progress() as progress:
@@ -269,9 +267,8 @@ def cost(
 @app.command()
 def paper(out: Out = None) -> None:
     """The source paper again: its 12 panels with both models, and a verdict on each of its claims."""
-    from toolkit.paper import reproduce_paper
-
     from toolkit.output import whole_folder
+    from toolkit.paper import reproduce_paper
 
     out = out or Path("paper")
     with _progress() as progress, whole_folder(out) as folder:
@@ -336,25 +333,25 @@ def web(port: Annotated[int, typer.Option("--port", help="Port on this computer.
 @app.command()
 def effects() -> None:
     """What can act on a pendulum: formulas, units, ranges, references."""
-    from toolkit.effects import describe
+    from toolkit.catalogue import describe_effects
 
-    typer.echo(describe())
+    typer.echo(describe_effects())
 
 
 @app.command()
 def models() -> None:
     """What can be fitted: formulas and parameters with units."""
-    from toolkit.models import describe
+    from toolkit.catalogue import describe_models
 
-    typer.echo(describe())
+    typer.echo(describe_models())
 
 
 @app.command()
 def trackers() -> None:
     """What can localise a bob."""
-    from toolkit.trackers import describe
+    from toolkit.catalogue import describe_trackers
 
-    typer.echo(describe())
+    typer.echo(describe_trackers())
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
 """Write the pages of the reference that the code itself can tell: commands, effects, models, localisers.
 
-    python docs/generate.py            write docs/reference/*.md
-    python docs/generate.py --check    say which pages are out of date; exit 1 if any
+python docs/generate.py            write docs/reference/*.md
+python docs/generate.py --check    say which pages are out of date; exit 1 if any
 """
 
 from __future__ import annotations
@@ -46,13 +46,14 @@ def listing_page(title: str, text: str) -> str:
 
 def pages() -> dict[str, str]:
     """File name -> content of every generated page."""
-    from toolkit import effects, models, trackers
+    from toolkit import catalogue
 
     return {
         "commands.md": commands_page(),
-        "effects.md": listing_page("What can act on a pendulum", effects.describe()),
-        "models.md": listing_page("What can be fitted", models.describe()),
-        "trackers.md": listing_page("What can localise a bob", trackers.describe()),
+        "effects.md": listing_page("What can act on a pendulum", catalogue.describe_effects()),
+        "models.md": listing_page("What can be fitted", catalogue.describe_models()),
+        "camera.md": listing_page("What a rendered camera can do", catalogue.describe_camera_effects()),
+        "trackers.md": listing_page("What can localise a bob", catalogue.describe_trackers()),
     }
 
 

@@ -212,7 +212,7 @@ def test_unsorted_and_duplicate_times_get_a_clear_word(tmp_path):
     [
         (["--mass-kg", -1], 2, "mass_kg"),
         (["--length-m", 0], 2, "length_m"),
-        (["--length-m", "long"], 2, "long"),
+        (["--length-m", "long"], 2, "--length-m"),
         (["--pivot", "3,4"], 2, "--pivot"),
         (["--lang", "xx"], 2, "xx"),
         (["--format", "doc"], 2, "doc"),

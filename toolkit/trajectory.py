@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,6 +53,13 @@ class Trajectory:
     warnings: tuple[str, ...] = ()
     equation_latex: str = ""
     meta: dict[str, Any] = field(default_factory=dict)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write `t_s,theta_rad,omega_rad_per_s,tension_n,energy_j`; numbers read back to the last bit."""
+        import pandas as pd
+
+        names = ("t_s", "theta_rad", "omega_rad_per_s", "tension_n", "energy_j")
+        pd.DataFrame({name: getattr(self, name) for name in names}).to_csv(path, index=False)
 
     @property
     def series(self) -> ThetaSeries:
