@@ -32,6 +32,21 @@ class Background:
         px, py = pivot if pivot is not None else (np.nan, np.nan)
         _compiled()(plane, self.mean, self.seen, *box, *bob, px, py, 1.0 / gain, most)
 
+    def window(self, x0: int, y0: int, width: int, height: int, dx: float, dy: float) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and seen of the pixels from (x0, y0) on, moved by a fraction of a pixel; beyond the rim the rim's."""
+        import cv2
+
+        back = np.array([[1.0, 0.0, x0 - dx], [0.0, 1.0, y0 - dy]])
+        how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        a, b = max(0, min(x0 - 2, self.mean.shape[1] - 4)), max(0, min(y0 - 2, self.mean.shape[0] - 4))
+        c, d = min(self.mean.shape[1], a + width + 4), min(self.mean.shape[0], b + height + 4)
+        back[:, 2] -= (a, b)
+        mean, seen = (
+            cv2.warpAffine(p[b:d, a:c], back, (width, height), flags=how, borderMode=cv2.BORDER_REPLICATE)
+            for p in (self.mean, self.seen)
+        )
+        return mean, seen
+
     def fill_gaps(self, box: tuple[int, int, int, int]) -> None:
         """Give pixels of the box that were never seen the level of seen pixels near them (`seen` stays 0)."""
         import cv2

@@ -125,11 +125,13 @@ def _measured(track: Track) -> tuple[np.ndarray, ...]:
     x = (track.x_px - np.asarray(track.meta.get("shift_x_px", zero)))[kept]
     y = (track.y_px - np.asarray(track.meta.get("shift_y_px", zero)))[kept]
     t = track.t_s[kept]
+    shake = np.asarray(track.meta.get("shift_sigma_px", zero))
     rising = np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])
     if rising.sum() < 8:
         raise JobError("the video's time stamps do not increase; convert it with a fixed frame rate")
     kept = kept[rising]
-    return t[rising], x[rising], y[rising], track.sigma_x_px[kept], track.sigma_y_px[kept], kept
+    sx, sy = (np.hypot(s[kept], shake[kept]) for s in (track.sigma_x_px, track.sigma_y_px))
+    return t[rising], x[rising], y[rising], sx, sy, kept
 
 
 def arc_pivot(x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray) -> PivotEstimate | None:
@@ -216,17 +218,17 @@ def _pivot(
 
 
 def _string_pivot(track: Track, kept: np.ndarray) -> PivotEstimate | None:
-    angle = track.meta.get("string_angle_rad")
-    if angle is None:
+    if track.meta.get("string_angle_rad") is None:
         return None
-    sx, sy = (np.asarray(track.meta.get(f"shift_{a}_px", np.zeros(track.t_s.size))) for a in "xy")
-    u, x, y = (np.asarray(track.meta[f"string_{n}"])[kept] for n in ("angle_sigma_rad", "x_px", "y_px"))
-    a = np.asarray(angle)[kept]
-    good = np.isfinite(a) & np.isfinite(u)
+    x, y, angle, turn, place = (
+        np.asarray(track.meta[f"string_{n}"])[kept]
+        for n in ("x_px", "y_px", "angle_rad", "angle_sigma_rad", "sigma_px")
+    )
+    good = np.isfinite(angle)
     if good.sum() < 8:
         return None
-    reach = np.hypot(x - track.pivot_px[0], y - track.pivot_px[1])[good]
-    return line_pivot((x - sx[kept])[good], (y - sy[kept])[good], a[good], u[good] * reach + 1e-3)
+    reach = np.hypot(x - track.pivot_px[0], y - track.pivot_px[1])
+    return line_pivot(x[good], y[good], angle[good], np.hypot(turn * reach, place)[good] + 1e-3)
 
 
 def _vertical(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain, pairwise
@@ -11,15 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.background import Background
+from toolkit.acquire import REMEDY, find_bob
 from toolkit.errors import JobError, UsageError
+from toolkit.follow import Follower, Record
 from toolkit.output import whole_file
 from toolkit.progress import Progress, silent
-from toolkit.search import Hypothesis, find_round_movers, shrink
-from toolkit.swing import Swing, fit_swing, start_swing
+from toolkit.swing import Swing, fit_swing
 from toolkit.trackers import load_tracker
-from toolkit.trackers.disc import fit_disc
-from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
@@ -82,20 +79,18 @@ def track(
         raise UsageError(f"fps_factor must be a positive number, got {fps_factor}")
     if radius is not None and not radius > 0:
         raise UsageError(f"radius must be positive, got {radius}")
+    if localiser is not None:
+        load_tracker(localiser)
     video = open_video(video_path)
-    used = _between(iter(video), start_s, stop_s)
-    job = _Job(video, pivot, bob, radius, localiser)
     progress("searching", 0.0)
-    batch = _read_ahead(used)
-    _require_frames(batch, video)
-    job.begin(batch)
+    follower, frames = _begin(video, pivot, bob, radius, localiser, start_s, stop_s)
     expected = _expected_frames(video, start_s, stop_s)
-    for frame in chain(batch, used):
-        job.follow(frame)
-        if job.count % 64 == 0:
-            progress("tracking", min(1.0, job.count / expected))
+    for count, frame in enumerate(frames):
+        follower.follow(frame)
+        if count % 64 == 0:
+            progress("tracking", min(1.0, count / expected))
     progress("tracking", 1.0)
-    return job.finish(fps_factor)
+    return _finish(video, follower, pivot, fps_factor)
 
 
 def write_track_csv(track: Track, path: str | Path) -> None:
@@ -112,7 +107,41 @@ def write_track_csv(track: Track, path: str | Path) -> None:
 
 # --- the pieces ---------------------------------------------------------------------------------------------------
 
-_REMEDY = "give --bob X,Y (its centre in px on the first frame)"
+
+def _begin(
+    video: Video,
+    pivot: tuple[float, float] | None,
+    bob: tuple[float, float] | None,
+    radius: float | None,
+    localiser: str | None,
+    start_s: float | None,
+    stop_s: float | None,
+) -> tuple[Follower, Iterator[Frame]]:
+    """A follower that knows the bob, and all frames to be followed.
+
+    Ordinarily the search looks at the first frames, kept in memory, and the file is decoded once. Where these do not
+    show it (a slow swing, slow motion), every third or ninth frame over a longer time is searched, and the file decoded again.
+    """
+    first: JobError | None = None
+    for every in (1, 3, 9):
+        used = _between(iter(video), start_s, stop_s)
+        batch = _read_ahead(used, every)
+        if every == 1:
+            _require_frames(batch, video)
+        elif len(batch) < 12:
+            break
+        try:
+            rough = find_bob(batch, bob, radius, str(video.path))
+        except JobError as error:
+            first = first or error
+            continue
+        follower = Follower(batch, rough, pivot, radius, localiser)
+        if every == 1:
+            return follower, chain(batch, used)
+        follower.interval_s /= every
+        follower.exposure_s = min(follower.exposure_s, follower.interval_s)
+        return follower, _between(iter(video), start_s, stop_s)
+    raise first  # type: ignore[misc]
 
 
 def _between(frames: Iterator[Frame], start_s: float | None, stop_s: float | None) -> Iterator[Frame]:
@@ -132,14 +161,16 @@ def _expected_frames(video: Video, start_s: float | None, stop_s: float | None) 
     return max(1, int((stop - (start_s or 0.0)) * (video.fps_header or 30.0))) if stop < 1e9 else 1000
 
 
-def _read_ahead(frames: Iterator[Frame], most_s: float = 1.6, most_bytes: float = 2.2e8) -> list[Frame]:
-    """The first frames, kept in memory: the search looks at these, so that the file is decoded only once."""
+def _read_ahead(frames: Iterator[Frame], every: int = 1, most_s: float = 1.6, most_bytes: float = 2.2e8) -> list[Frame]:
+    """The first frames (or every n-th of them), kept in memory for the search."""
     batch: list[Frame] = []
     size = 0.0
-    for frame in frames:
+    for count, frame in enumerate(frames):
+        if count % every:
+            continue
         batch.append(frame)
         size += 1.5 * frame.luma.size
-        if len(batch) >= 24 and (size > most_bytes or frame.t_s - batch[0].t_s > most_s):
+        if len(batch) >= 24 and (size > most_bytes or frame.t_s - batch[0].t_s > most_s * every):
             break
     return batch
 
@@ -153,428 +184,201 @@ def _require_frames(batch: list[Frame], video: Video) -> None:
         raise JobError(f"{video.path} holds only {len(batch)} frames; film at least half a period")
 
 
-@dataclass
-class _Job:
-    """The state of one tracking run: what the bob looks like, where it was, what hides behind it."""
+def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None, fps_factor: float) -> Track:
+    """Judge the whole motion, bridge the gaps, make σ true."""
+    r = follower.record
+    log: list[str] = []
+    warnings: list[str] = []
+    t = _even_times(np.array(r.t_s), video, log)
+    t = t - t[0]
+    x, y, sx, sy = (np.array([getattr(p, n) for p in r.place]) for n in ("x_px", "y_px", "sigma_x_px", "sigma_y_px"))
+    good = np.array(r.ok)
+    if good.sum() < max(8, 0.3 * good.size):
+        raise JobError(f"the bob was seen on only {good.sum()} of {good.size} frames of {video.path}; {REMEDY}")
+    start = follower.swing
+    start = Swing(start.values, start.covariance, start.t0_s - r.t_s[0], start.rms_px)
+    shift = _Shift(r, follower.shaking, good, log)
+    x, y = x + shift.raw_x - shift.x, y + shift.raw_y - shift.y
+    swing = _whole_swing(start, t, x, y, good, video.path)
+    _require_pendulum(swing, t, x, y, good, video.path)
+    mx, my = swing.position(t)
+    good = good & ~_out_of_time(r, t, x - mx, y - my, swing, good, warnings)
+    for a in (x, y, sx, sy):
+        a[~good] = np.nan
+    scale = _true_sigma(x - mx, y - my, sx, sy, good, shift.sigma)
+    sx, sy = sx * scale[0], sy * scale[1]
+    status = np.where(good, OK, LOST).astype("U9")
+    bridged = _bridged(good, t, swing.period_s)
+    spread = float(np.hypot(np.nanstd((x - mx)[good]), np.nanstd((y - my)[good])))
+    x[bridged], y[bridged] = mx[bridged], my[bridged]
+    sx[bridged] = sy[bridged] = max(spread, 0.02)
+    status[bridged] = PREDICTED
+    steps = np.diff(t)
+    fps = float(1 / np.median(steps[steps > 0])) * fps_factor if np.any(steps > 0) else float("nan")
+    look = follower.look
+    log += [
+        f"The bob was followed by its {follower.sight.name} with the {follower.localiser.name} localiser (radius "
+        f"{look.radius_px:.2f} px, edge {look.edge_px:.2f} px, exposure {follower.exposure_s / fps_factor * 1e3:.1f} ms): "
+        f"{good.sum()} of {good.size} frames measured, {bridged.sum()} bridged by the fitted motion.",
+        f"The error bars of the fit were multiplied by {scale[0]:.2f} (x) and {scale[1]:.2f} (y), "  # noqa: ISC004
+        "the scatter seen about a smooth motion.",
+    ]
+    strings = np.full((t.size, 5), np.nan)
+    for k, line in r.string.items():
+        strings[k] = line
+    return Track(
+        frame=np.array(r.index),
+        t_s=t / fps_factor,
+        x_px=x + shift.x,
+        y_px=y + shift.y,
+        sigma_x_px=sx,
+        sigma_y_px=sy,
+        status=status,
+        radius_px=float(look.radius_px),
+        pivot_px=pivot or swing.pivot_px,
+        pivot_sigma_px=(1.0, 1.0)
+        if pivot
+        else (float(np.sqrt(swing.covariance[0, 0])), float(np.sqrt(swing.covariance[1, 1]))),
+        localiser=follower.localiser.name,
+        meta={
+            "source": str(video.path),
+            "width_px": video.width_px,
+            "height_px": video.height_px,
+            "fps": fps,
+            "fps_factor": fps_factor,
+            "time_source": video.time_source,
+            "sight": follower.sight.name,
+            "exposure_s": follower.exposure_s / fps_factor,
+            "edge_px": float(look.edge_px),
+            "contrast": float(look.contrast),
+            "visible": np.array([p.visible for p in r.place]),
+            "misfit": np.array([p.misfit for p in r.place]),
+            "residual_rms_px": swing.rms_px,
+            "swing": _at_first_measured(swing, t, good, fps_factor),
+            "pivot_given": pivot is not None,
+            "shift_x_px": shift.x,
+            "shift_y_px": shift.y,
+            "shift_sigma_px": shift.sigma,
+            "string_x_px": strings[:, 0],
+            "string_y_px": strings[:, 1],
+            "string_angle_rad": strings[:, 2],
+            "string_angle_sigma_rad": strings[:, 3],
+            "string_sigma_px": strings[:, 4],
+            "log": log,
+            "warnings": [*video.warnings, *clock_warnings(t, video), *warnings],
+        },
+    )
 
-    video: Video
-    pivot: tuple[float, float] | None
-    bob: tuple[float, float] | None
-    radius: float | None
-    wanted: str | None
-    log: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    count: int = 0
 
-    # --- search ---------------------------------------------------------------------------------------------------
+class _Shift:
+    """How far the camera's shake moved the bob's place on each frame, smoothed as far as its own noise asks for."""
 
-    def begin(self, batch: list[Frame]) -> None:
-        """Find the bob in the frames read ahead, learn its looks and the background, choose the localiser."""
-        self.shape = batch[0].luma.shape
-        self.localiser: Localiser = load_tracker(self.wanted or "disc")
-        hypotheses, samples = self._hypotheses(batch)
-        best: tuple[float, _Rough] | None = None
-        for h in hypotheses:
-            rough = self._follow_roughly(batch, samples[h.sample], h)
-            if rough is not None:
-                score = rough.score
-                if best is None or score > best[0]:
-                    best = (score, rough)
-                if self.bob is not None:
-                    break
-        if best is None:
-            if not hypotheses:
-                raise JobError(
-                    f"nothing that moves was found in {self.video.path}; film the swinging bob, or {_REMEDY}"
-                )
-            raise JobError(f"nothing in {self.video.path} moves like a pendulum; if there is one, {_REMEDY}")
-        rough = best[1]
-        self.look, self.swing = rough.look, rough.swing
-        self._learn(batch, rough)
-        n = 0
-        self.t, self.x, self.y = [], [], []
-        self.sx, self.sy, self.state, self.index, self.misfit, self.visible = [], [], [], [], [], []
-        self.hidden = n
-        self.recent: deque[tuple[float, float, float]] = deque(maxlen=4)
-
-    def _hypotheses(self, batch: list[Frame]) -> tuple[list[Hypothesis], list[int]]:
-        samples = sorted({round(i) for i in np.linspace(0, len(batch) - 1, 16)})
-        if self.bob is not None:
-            x, y = self.bob
-            if not (0 <= x < self.shape[1] and 0 <= y < self.shape[0]):
-                raise UsageError(f"bob ({x:g}, {y:g}) lies outside the picture of {self.shape[1]}×{self.shape[0]} px")
-            radii = [self.radius] if self.radius else [r for r in (20.0, 12.0, 30.0, 8.0, 45.0, 5.0, 70.0)]
-            return [Hypothesis(0, x, y, r, 0, 1.0) for r in radii], samples
-        factor = max(1, round(self.shape[1] / 420))
-        pictures = [shrink(batch[i].luma, factor) for i in samples]
-        found = find_round_movers(pictures, factor)
-        if self.radius:
-            found = [h._replace(radius_px=self.radius) for h in found]
-        return found, samples
-
-    def _follow_roughly(self, batch: list[Frame], start: int, h: Hypothesis) -> _Rough | None:
-        """Follow a hypothesis through the frames read ahead without knowing the background."""
-        look = Look(h.radius_px, max(0.8, 0.12 * h.radius_px))
-        first = self._flat_fit(batch[start], look, Guess(h.x_px, h.y_px), calibrate=True, soften=2.0, turns=10)
-        if first is None:
-            return None
-        x, y, look = first
-        if not (self.radius or 0.4 < look.radius_px / h.radius_px < 2.2):
-            return None
-        points = {start: (x, y)}
-        looks = [look]
-        for way in (1, -1):
-            recent = [(batch[start].t_s, x, y)]
-            misses = 0
-            i = start + way
-            while 0 <= i < len(batch) and misses < 4:
-                gx, gy = _extrapolate(recent, batch[i].t_s)
-                fit = self._flat_fit(batch[i], look, Guess(gx, gy), calibrate=False, soften=2.5, turns=12)
-                if fit is not None:
-                    fit = self._flat_fit(batch[i], look, Guess(fit[0], fit[1]), calibrate=True, turns=6)
-                alike = fit is not None and (
-                    0.7 < fit[2].radius_px / look.radius_px < 1.4 and 0.4 < fit[2].contrast / look.contrast < 2.0
-                )
-                if fit is not None and alike:
-                    points[i] = fit[:2]
-                    looks.append(fit[2])
-                    recent = [*recent, (batch[i].t_s, *fit[:2])][-3:]
-                    misses = 0
-                else:
-                    misses += 1
-                i += way
-        if len(points) < max(8, 0.5 * len(batch)):
-            return None
-        order = sorted(points)
-        t = np.array([batch[i].t_s for i in order])
-        px = np.array([points[i] for i in order])
-        radius = self.radius or float(np.median([k.radius_px for k in looks]))
-        look = Look(
-            radius,
-            float(np.median([k.edge_px for k in looks])),
-            float(np.median([k.contrast for k in looks])),
-            float(np.median([k.noise for k in looks])),
-        )
-        extent = float(np.hypot(*np.ptp(px, axis=0)))
-        if extent < max(1.0, 0.05 * radius):
-            return None  # it does not move
-        begin = start_swing(t, px[:, 0], px[:, 1])
-        swing = None
-        if begin is not None:
-            swing = fit_swing(t, px[:, 0], px[:, 1], np.full(t.size, 0.3), begin)
-        if swing is None or swing.rms_px > max(0.05 * extent, 0.5):
-            return None
-        quality = abs(look.contrast) / (look.noise + 1.0)
-        score = len(points) / len(batch) * quality * radius**0.5 / (0.3 + swing.rms_px)
-        return _Rough(look, swing, {i: points[i] for i in order}, score)
-
-    def _flat_fit(self, frame: Frame, look: Look, guess: Guess, **how: Any) -> tuple[float, float, Look] | None:
-        """Disc fit against a wall of one level (the median of the patch's rim)."""
-        patch = self._cut(frame, guess, 1.6 * look.radius_px + 6)
-        if patch is None:
-            return None
-        rim = np.concatenate([patch.image[0], patch.image[-1], patch.image[:, 0], patch.image[:, -1]])
-        level = float(np.median(rim))
-        patch = patch._replace(back=np.full_like(patch.image, max(level, 1.0)), seen=np.zeros_like(patch.image))
-        out = fit_disc(patch, look._replace(noise=np.inf), guess, **how)
-        if out is None or abs(out[9]) < 4:
-            return None
-        x, y = out[0] + patch.x_px, out[1] + patch.y_px
-        return x, y, Look(out[2], out[3], out[9], out[7])
-
-    def _cut(self, frame: Frame, guess: Guess, half: float) -> Patch | None:
-        """The patch of ±half px about the guess, as far as it lies in the picture."""
-        if not (np.isfinite(guess.x_px) and np.isfinite(guess.y_px)):
-            return None
-        x0, x1 = max(0, int(guess.x_px - half)), min(self.shape[1], int(guess.x_px + half) + 2)
-        y0, y1 = max(0, int(guess.y_px - half)), min(self.shape[0], int(guess.y_px + half) + 2)
-        if x1 - x0 < 6 or y1 - y0 < 6:
-            return None
-        image = frame.luma[y0:y1, x0:x1].astype(np.float32)
-        return Patch(image, image, image, x0, y0)
-
-    # --- learning -------------------------------------------------------------------------------------------------
-
-    def _learn(self, batch: list[Frame], rough: _Rough) -> None:
-        """Background from all frames read ahead, then radius, edge and exposure from fits against it."""
-        self.back = Background(self.shape)
-        pivot = self.pivot or rough.swing.pivot_px
-        xs, ys = np.array(list(rough.points.values())).T
-        grow = 3 * rough.look.radius_px + 20
-        box = (
-            max(0, int(xs.min() - grow)),
-            max(0, int(ys.min() - grow)),
-            min(self.shape[1], int(xs.max() + grow)),
-            min(self.shape[0], int(ys.max() + grow)),
-        )
-        every = max(1, len(batch) // 40)
-        for i, (x, y) in rough.points.items():
-            if i % every == 0:
-                piece = batch[i].luma[box[1] : box[3], box[0] : box[2]]
-                keep_out = 1.1 * rough.look.radius_px + 2 * rough.look.edge_px + 2
-                self.back.add(piece, box, (x, y, keep_out), pivot)
-        self.back.fill_gaps(box)
-        times = np.array([batch[i].t_s for i in rough.points])
-        vx, vy = rough.swing.velocity(times)
-        speed = np.hypot(vx, vy)
-        interval = float(np.median(np.diff([f.t_s for f in batch])))
-        look = rough.look
-        numbers = list(rough.points)
-        # radius and edge where it is slow
-        slow = np.argsort(speed)[: max(6, len(numbers) // 4)]
-        fits = []
-        for k in slow[:16]:
-            i = numbers[k]
-            fit = self._fine(batch[i], look, self._guess(*rough.points[i], 0.0, 0.0), calibrate=True, turns=6)
-            if fit is not None:
-                fits.append(fit)
-        if len(fits) >= 3:
-            middle = np.median(np.array(fits), axis=0)
-            look = Look(self.radius or middle[2], max(0.35, middle[3]), middle[9], middle[7])
-        # exposure where it is fast: the streak that fits best
-        self.exposure_s = 0.0
-        fast = [numbers[k] for k in np.argsort(-speed)[:8]]
-        if speed.max() * interval > 1.0:
-            trials = np.linspace(0, 1, 11)
-            cost = np.zeros(trials.size)
-            for i in fast:
-                ux, uy = (v[numbers.index(i)] * interval for v in (vx, vy))
-                for j, part in enumerate(trials):
-                    fit = self._fine(batch[i], look, self._guess(*rough.points[i], part * ux, part * uy), turns=4)
-                    cost[j] += np.inf if fit is None else fit[7] ** 2
-            if np.isfinite(cost).sum() > 2:
-                j = int(np.argmin(cost))
-                part = trials[j]
-                if 0 < j < trials.size - 1 and np.all(np.isfinite(cost[j - 1 : j + 2])):
-                    a, b, c = cost[j - 1 : j + 2]
-                    part += 0.1 * 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
-                self.exposure_s = float(max(0.0, part) * interval)
-        self.look = look
-        self.interval_s = interval
-
-    def _guess(self, x: float, y: float, bx: float, by: float) -> Guess:
-        px, py = self.pivot or self.swing.pivot_px
-        return Guess(x, y, bx, by, float(np.arctan2(py - y, px - x)))
-
-    def _patch(self, frame: Frame, look: Look, guess: Guess) -> Patch | None:
-        half = 1.25 * look.radius_px + 4 * look.edge_px + 4 + 0.5 * np.hypot(guess.streak_x_px, guess.streak_y_px)
-        patch = self._cut(frame, guess, half)
-        if patch is None:
-            return None
-        rows, columns = patch.image.shape
-        window = (slice(patch.y_px, patch.y_px + rows), slice(patch.x_px, patch.x_px + columns))
-        return patch._replace(back=self.back.mean[window], seen=self.back.seen[window])
-
-    def _fine(self, frame: Frame, look: Look, guess: Guess, **how: Any) -> np.ndarray | None:
-        patch = self._patch(frame, look, guess)
-        if patch is None:
-            return None
-        out = fit_disc(patch, look, guess, **how)
-        if out is not None:
-            out[0] += patch.x_px
-            out[1] += patch.y_px
-        return out
-
-    # --- following ------------------------------------------------------------------------------------------------
-
-    def follow(self, frame: Frame) -> None:
-        """Measure one frame, in the order of the file."""
-        t = frame.t_s
-        x, y, vx, vy = self._expect(t)
-        guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
-        patch = self._patch(frame, self.look, guess)
-        place = NOWHERE
-        if patch is not None:
-            if self.hidden or len(self.recent) < 3:
-                wide = fit_disc(patch, self.look._replace(noise=np.inf), guess, soften=2.5, turns=10)
-                if wide is not None:
-                    guess = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
-            place = self.localiser.locate(patch, self.look, guess)
-            if not np.isfinite(place.x_px):
-                wide = fit_disc(patch, self.look._replace(noise=np.inf), guess, soften=3.0, turns=12)
-                if wide is not None:
-                    near = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
-                    place = self.localiser.locate(patch, self.look, near)
-        ok = self._accept(place, x, y)
-        self.index.append(frame.index)
-        self.t.append(t)
-        self.state.append(OK if ok else LOST)
-        self.x.append(place.x_px if ok else np.nan)
-        self.y.append(place.y_px if ok else np.nan)
-        self.sx.append(place.sigma_x_px if ok else np.nan)
-        self.sy.append(place.sigma_y_px if ok else np.nan)
-        self.misfit.append(place.misfit)
-        self.visible.append(place.visible)
-        if ok and patch is not None:
-            self.hidden = 0
-            self.recent.append((t, place.x_px, place.y_px))
-            rows, columns = patch.image.shape
-            box = (patch.x_px, patch.y_px, patch.x_px + columns, patch.y_px + rows)
-            streak = 0.5 * np.hypot(guess.streak_x_px, guess.streak_y_px)
-            keep_out = 1.05 * self.look.radius_px + 3 * self.look.edge_px + 1 + streak
-            self.back.add(patch.image, box, (place.x_px, place.y_px, keep_out), self.pivot or self.swing.pivot_px)
-        else:
-            self.hidden += 1
-            if self.hidden == 2:
-                self._refit()
-        self.count += 1
-
-    def _accept(self, place: Place, x: float, y: float) -> bool:
-        look = self.look
-        if not np.isfinite(place.x_px):
-            return False
-        return bool(
-            place.visible >= 0.85
-            and place.misfit < 3 * look.noise + 0.03 * abs(look.contrast)
-            and 0.6 < place.contrast / look.contrast < 1.6
-            and np.hypot(place.x_px - x, place.y_px - y) < 0.6 * look.radius_px + 2
-        )
-
-    def _expect(self, t: float) -> tuple[float, float, float, float]:
-        """Where the bob should be at time t and how fast, px and px/s."""
-        recent = list(self.recent)[-3:]
-        if self.hidden < 2 and len(recent) == 3 and t - recent[0][0] < 6 * self.interval_s:
-            x, y = _extrapolate(recent, t)
-            x1, y1 = _extrapolate(recent, t + 0.5 * self.interval_s)
-            x0, y0 = _extrapolate(recent, t - 0.5 * self.interval_s)
-            return x, y, (x1 - x0) / self.interval_s, (y1 - y0) / self.interval_s
-        px, py = self.swing.position(np.array([t]))
-        vx, vy = self.swing.velocity(np.array([t]))
-        return float(px[0]), float(py[0]), float(vx[0]), float(vy[0])
-
-    def _refit(self) -> None:
-        """Fit the motion to what was measured last, to see through a gap."""
-        good = np.isfinite(self.x)
-        if good.sum() < 20:
+    def __init__(self, r: Record, shaking: bool, good: np.ndarray, log: list[str]) -> None:
+        n = len(r.index)
+        self.raw_x, self.raw_y = np.zeros(n), np.zeros(n)
+        self.sigma = np.zeros(n)
+        self.x, self.y = self.raw_x, self.raw_y
+        if not shaking:
             return
-        t, x, y = (np.array(v)[good][-600:] for v in (self.t, self.x, self.y))
-        start = self._restarted(t[0])
-        swing = fit_swing(t, x, y, np.full(t.size, 0.1), start)
-        if swing is not None and swing.rms_px < 0.25 * self.look.radius_px + 1:
-            self.swing = swing
-
-    def _restarted(self, t0: float) -> np.ndarray:
-        theta, rate = self.swing.angle(np.array([t0]))
-        values = self.swing.values.copy()
-        values[7:] = theta[0], rate[0]
-        return values
-
-    # --- the end --------------------------------------------------------------------------------------------------
-
-    def finish(self, fps_factor: float) -> Track:
-        """Judge the whole motion, bridge the gaps, make σ true."""
-        self.t = list(_even_times(np.array(self.t), self.video, self.log))
-        t = np.array(self.t)
-        t = t - t[0]
-        x, y = np.array(self.x), np.array(self.y)
-        sx, sy = np.array(self.sx), np.array(self.sy)
-        status = np.array(self.state, dtype="U9")
-        good = status == OK
-        if good.sum() < max(8, 0.3 * good.size):
-            raise JobError(
-                f"the bob was seen on only {good.sum()} of {good.size} frames of {self.video.path}; {_REMEDY}"
-            )
-        t0 = self.t[0]
-        swing = self._final_swing(t + t0, x, y, good)
-        _require_pendulum(swing, t + t0, x, y, good, self.video.path)
-        mx, my = swing.position(t + t0)
-        scale = _true_sigma(x - mx, y - my, sx, sy, good)
-        sx, sy = sx * scale[0], sy * scale[1]
-        bridged = _bridged(good, t, swing.period_s)
-        spread = float(np.hypot(np.nanstd((x - mx)[good]), np.nanstd((y - my)[good])))
-        x[bridged], y[bridged] = mx[bridged], my[bridged]
-        sx[bridged] = sy[bridged] = max(spread, 0.02)
-        status[bridged] = PREDICTED
-        steps = np.diff(t)
-        fps = float(1 / np.median(steps[steps > 0])) * fps_factor if np.any(steps > 0) else float("nan")
-        warnings = [*self.video.warnings, *clock_warnings(t, self.video), *self.warnings]
-        log = [
-            *self.log,
-            (
-                f"The bob was followed with the {self.localiser.name} localiser (radius {self.look.radius_px:.2f} px, "
-                f"edge {self.look.edge_px:.2f} px, exposure {self.exposure_s / fps_factor * 1e3:.1f} ms): "
-                f"{good.sum()} of {good.size} frames measured, {bridged.sum()} bridged by the fitted motion."
-            ),
-            (
-                f"The error bars of the fit were multiplied by {scale[0]:.2f} (x) and {scale[1]:.2f} (y), "
-                "the scatter seen about a smooth motion."
-            ),
-        ]
-        return Track(
-            frame=np.array(self.index),
-            t_s=t / fps_factor,
-            x_px=x,
-            y_px=y,
-            sigma_x_px=sx,
-            sigma_y_px=sy,
-            status=status,
-            radius_px=float(self.look.radius_px),
-            pivot_px=self.pivot or swing.pivot_px,
-            pivot_sigma_px=(float(np.sqrt(swing.covariance[0, 0])), float(np.sqrt(swing.covariance[1, 1]))),
-            localiser=self.localiser.name,
-            meta={
-                "source": str(self.video.path),
-                "width_px": self.video.width_px,
-                "height_px": self.video.height_px,
-                "fps": fps,
-                "fps_factor": fps_factor,
-                "time_source": self.video.time_source,
-                "exposure_s": self.exposure_s / fps_factor,
-                "edge_px": float(self.look.edge_px),
-                "contrast": float(self.look.contrast),
-                "visible": np.array(self.visible),
-                "misfit": np.array(self.misfit),
-                "residual_rms_px": swing.rms_px,
-                "swing": _at_first_measured(swing, t + t0, good, fps_factor),
-                "log": log,
-                "warnings": warnings,
-            },
+        for k, (s, p) in enumerate(zip(r.shift, r.place)):
+            ok = good[k]
+            self.raw_x[k], self.raw_y[k] = s.at(p.x_px if ok else s.centre_x_px, p.y_px if ok else s.centre_y_px)
+        shifts = np.array([(s.x_px, s.y_px) for s in r.shift])
+        smooth, sigma = _smoothed(shifts)
+        self.x = self.raw_x + (smooth - shifts)[:, 0]
+        self.y = self.raw_y + (smooth - shifts)[:, 1]
+        self.sigma = np.full(n, sigma)
+        extent = np.ptp(shifts, axis=0)
+        log.append(
+            f"The camera moved by up to {extent[0]:.1f} px across and {extent[1]:.1f} px down; this was measured on the "
+            f"still background (to {sigma:.3f} px a frame) and taken away."
         )
 
-    def _final_swing(self, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray) -> Swing:
-        chosen = np.flatnonzero(good)
-        # in growing pieces, so that a small error of the period at the start does not lose count of the swings
-        swing: Swing | None = None
-        stop = t[chosen[0]] + max(1.5 * self.swing.period_s, 1.5)
-        start = self._restarted(t[chosen[0]])
-        while True:
-            part = chosen[t[chosen] <= stop]
-            if part.size >= 12:
-                every = max(1, part.size // 1500)
-                p = part[::every]
-                swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.1), start)
-                if swing is None:
-                    break
-                start = swing.values
-            if stop >= t[-1]:
+
+def _smoothed(values: np.ndarray) -> tuple[np.ndarray, float]:
+    """Columns of `values` (n, k) by local parabolas over the longest window that adds no misfit; and what noise is left."""
+    n = len(values)
+    if n < 12:
+        return values, 0.0
+    third = values[3:] - 3 * values[2:-1] + 3 * values[1:-2] - values[:-3]
+    noise = float(1.4826 * np.median(np.abs(third)) / np.sqrt(20))
+    best, left = values, noise
+    for width in (5, 9, 15, 25, 41):
+        if width > n // 2:
+            break
+        half = width // 2
+        at = np.arange(-half, half + 1)
+        kernel = np.linalg.pinv(np.vander(at, 3, increasing=True))[0]
+        padded = np.pad(values, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
+        smooth = np.column_stack([np.convolve(c, kernel[::-1], "valid") for c in padded.T])
+        rest = values - smooth
+        own = noise * np.sqrt(1 - kernel[half])
+        if np.sqrt(np.mean(rest**2)) > 1.25 * own + 1e-4:
+            break
+        best, left = smooth, noise * float(np.sqrt(kernel[half]))
+    return best, left
+
+
+def _whole_swing(start: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray, path: Path) -> Swing:
+    """The motion over the whole clip, fitted in growing pieces, so that no swing is lost count of."""
+    chosen = np.flatnonzero(good)
+    theta, rate = start.angle(t[chosen[:1]])
+    values = start.values.copy()
+    values[7:] = theta[0], rate[0]
+    swing: Swing | None = None
+    stop = t[chosen[0]] + max(0.75 * start.period_s, 0.3)
+    while True:
+        part = chosen[t[chosen] <= stop]
+        if part.size >= 12:
+            p = part[:: max(1, part.size // 1500)]
+            swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.1), values)
+            if swing is None:
                 break
-            stop = t[chosen[0]] + 2.5 * (stop - t[chosen[0]])
-        if swing is None:
-            raise JobError(
-                f"what moves in {self.video.path} does not swing like a pendulum; if there is one, {_REMEDY}"
-            )
-        return swing
+            values = swing.values
+        if stop >= t[-1]:
+            break
+        stop = t[chosen[0]] + 2 * (stop - t[chosen[0]])
+    if swing is None:
+        raise JobError(f"what moves in {path} does not swing like a pendulum; if there is one, {REMEDY}")
+    return swing
 
 
-@dataclass(frozen=True)
-class _Rough:
-    look: Look
-    swing: Swing
-    points: dict[int, tuple[float, float]]
-    score: float
+def _out_of_time(
+    r: Record, t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, good: np.ndarray, warnings: list[str]
+) -> np.ndarray:
+    """Frames whose picture does not belong to their time stamp: repeats of the one before, and leaps along the motion."""
+    vx, vy = swing.velocity(t)
+    speed = np.hypot(vx, vy) + 1e-9
+    along = (rx * vx + ry * vy) / speed
+    across = (ry * vx - rx * vy) / speed
+    near = _running_median(along, good)
+    noise = 1.4826 * float(np.median(np.abs((along - near)[good]))) + 1e-3
+    step = np.gradient(t) * speed
+    leap = (
+        good & (np.abs(along - near) > np.maximum(8 * noise, 0.35 * step)) & (np.abs(across) < 4 * noise + 0.5 * step)
+    )
+    repeats = np.array(r.repeated) & (step > 4 * noise) & good
+    if repeats.any():
+        first = t[np.flatnonzero(repeats)[0]]
+        warnings.append(
+            f"{repeats.sum()} frame(s) repeat the picture before them, first at t = {first:.3f} s; they were not measured"
+        )
+    leap &= ~repeats
+    if leap.any():
+        first = t[np.flatnonzero(leap)[0]]
+        warnings.append(
+            f"{leap.sum()} frame(s) show the bob at another time than their stamp says (a camera that drops or repeats "
+            f"frames), first at t = {first:.3f} s; they were left out"
+        )
+    return leap | repeats
 
 
-def _extrapolate(recent: list[tuple[float, float, float]], t: float) -> tuple[float, float]:
-    """Through the last one, two or three points (t, x, y), to time t (Lagrange)."""
-    x = y = 0.0
-    for i, (ti, xi, yi) in enumerate(recent):
-        weight = 1.0
-        for j, (tj, _, _) in enumerate(recent):
-            if i != j:
-                weight *= (t - tj) / (ti - tj) if ti != tj else 0.0
-        x += weight * xi
-        y += weight * yi
-    return x, y
+def _running_median(values: np.ndarray, good: np.ndarray, half: int = 7) -> np.ndarray:
+    """Median of the good values within ±half places."""
+    padded = np.pad(np.where(good, values, np.nan), half, constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
+    filled = np.where(np.all(np.isnan(windows), axis=1)[:, None], 0.0, windows)
+    return np.nanmedian(filled, axis=1)
 
 
 def _require_pendulum(swing: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray, path: Path) -> None:
@@ -595,14 +399,18 @@ def _require_pendulum(swing: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray,
     if swing.values[4] <= 0:
         reasons.append("nothing pulls it back")
     if reasons:
-        raise JobError(f"what moves in {path} is no pendulum ({reasons[0]}); if there is one, {_REMEDY}")
+        raise JobError(f"what moves in {path} is no pendulum ({reasons[0]}); if there is one, {REMEDY}")
 
 
 def _true_sigma(
-    rx: np.ndarray, ry: np.ndarray, sx: np.ndarray, sy: np.ndarray, good: np.ndarray
+    rx: np.ndarray, ry: np.ndarray, sx: np.ndarray, sy: np.ndarray, good: np.ndarray, others: np.ndarray
 ) -> tuple[float, float]:
-    """Factors that make the fit's σ agree with the scatter about the motion."""
-    return tuple(float(np.sqrt(np.mean((r[good] / s[good]) ** 2))) for r, s in ((rx, sx), (ry, sy)))  # type: ignore[return-value]
+    """Factors that make the fit's σ agree with the scatter about the motion, less `others` (the shake's noise)."""
+    factors = []
+    for r, s in ((rx, sx), (ry, sy)):
+        square = float(np.mean((r[good] ** 2 - others[good] ** 2) / s[good] ** 2))
+        factors.append(float(np.sqrt(max(square, 0.25))))
+    return factors[0], factors[1]
 
 
 def _even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:

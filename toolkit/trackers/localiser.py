@@ -14,14 +14,14 @@ class Patch(NamedTuple):
 
     image : the frame (luma, or the colour projection in which the bob stands out).    back : what the picture is
     without the bob.    seen : in how many frames each pixel of `back` was seen; 0 where it is only a guess.
-    x_px, y_px : where in the whole frame the patch's first pixel lies.
+    x_px, y_px : where the patch's first pixel lies (where the camera shakes: in the first frame's pixels).
     """
 
     image: np.ndarray
     back: np.ndarray
     seen: np.ndarray
-    x_px: int
-    y_px: int
+    x_px: float
+    y_px: float
 
 
 class Look(NamedTuple):

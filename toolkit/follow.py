@@ -1,0 +1,344 @@
+"""The bob followed frame by frame: where it should be, where it is, whether to believe that."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from toolkit.acquire import Rough, cut, extrapolate
+from toolkit.background import Background
+from toolkit.stillness import STILL, Anchors, CameraShift
+from toolkit.string_line import measure_string
+from toolkit.swing import Swing, fit_swing
+from toolkit.trackers import load_tracker
+from toolkit.trackers.disc import fit_disc
+from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
+from toolkit.video import Frame
+
+_STRING_EVERY = 3
+
+
+@dataclass
+class Record:
+    """What was measured, one entry a frame; positions in the first frame's pixels (those of a still camera)."""
+
+    index: list[int] = field(default_factory=list)
+    t_s: list[float] = field(default_factory=list)
+    place: list[Place] = field(default_factory=list)
+    ok: list[bool] = field(default_factory=list)
+    repeated: list[bool] = field(default_factory=list)
+    shift: list[CameraShift] = field(default_factory=list)
+    string: dict[int, tuple[float, ...]] = field(default_factory=dict)
+
+
+class Follower:
+    """Follows one bob, given what was found in the frames read ahead.
+
+    After construction `look`, `exposure_s`, `shaking` and `localiser` say what was learned; call `follow` with every
+    frame in order and read `record`.
+    """
+
+    def __init__(
+        self,
+        batch: list[Frame],
+        rough: Rough,
+        pivot: tuple[float, float] | None,
+        radius: float | None,
+        wanted: str | None,
+    ) -> None:
+        self.shape = batch[0].luma.shape
+        self.sight = rough.sight
+        self.pivot = pivot
+        self.swing = rough.swing
+        self.record = Record()
+        self.hidden = 0
+        self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
+        self.interval_s = float(np.median(np.diff([f.t_s for f in batch]))) or 1 / 30
+        self._print: np.ndarray | None = None
+        points = self._learn_stillness(batch, rough)
+        self._learn_background(batch, rough.look, points)
+        self.look, self.exposure_s = self._learn_looks(batch, rough.look, points, radius)
+        self.ordinary_misfit = self.look.noise
+        self.localiser: Localiser = self._choose(batch, points, wanted)
+
+    # --- learning -------------------------------------------------------------------------------------------------
+
+    def _learn_stillness(self, batch: list[Frame], rough: Rough) -> dict[int, tuple[float, float]]:
+        """Does the camera move? Then the points found are put into the first frame's pixels and refitted."""
+        import cv2
+
+        moving = np.zeros(self.shape, np.uint8)
+        pivot = self.pivot or rough.swing.pivot_px
+        reach = int(2 * rough.look.radius_px + 10)
+        for i, (x, y) in rough.points.items():
+            cv2.circle(moving, (round(x), round(y)), reach, 1, -1)
+            if i % 3 == 0:
+                far = np.clip(pivot, -30000, 30000)
+                cv2.line(moving, (round(x), round(y)), (round(far[0]), round(far[1])), 1, 44)
+        self.anchors = Anchors(batch[0].luma, moving > 0)
+        self.shaking = False
+        self._shifts: dict[int, CameraShift] = {}
+        points = dict(rough.points)
+        if len(self.anchors) == 0:
+            return points
+        probe = [self.anchors.shift(batch[i].luma) for i in range(0, len(batch), max(1, len(batch) // 12))]
+        seen = [s for s in probe if s is not None]
+        if len(seen) < 4:
+            return points
+        offs = np.array([(s.x_px, s.y_px) for s in seen])
+        noise = float(np.median([s.sigma_px for s in seen]))
+        if np.ptp(offs, axis=0).max() < max(0.25, 6 * noise):
+            return points
+        self.shaking = True
+        last = STILL
+        for frame in batch:
+            last = self.anchors.shift(frame.luma) or last
+            self._shifts[frame.index] = last
+        for i, (x, y) in points.items():
+            dx, dy = self._shifts[batch[i].index].at(x, y)
+            points[i] = (x - dx, y - dy)
+        t = np.array([batch[i].t_s for i in points])
+        x, y = np.array(list(points.values())).T
+        better = fit_swing(t, x, y, np.full(t.size, 0.3), _restarted(rough.swing, t[0]))
+        self.swing = better or self.swing
+        return points
+
+    def _learn_background(self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]]) -> None:
+        self.back = Background((self.shape[0], self.shape[1]))
+        xs, ys = np.array(list(points.values())).T
+        grow = 3 * look.radius_px + 20
+        x0, y0 = max(0, int(xs.min() - grow)), max(0, int(ys.min() - grow))
+        x1, y1 = min(self.shape[1], int(xs.max() + grow)), min(self.shape[0], int(ys.max() + grow))
+        every = max(1, len(batch) // 40)
+        pivot = self.pivot or self.swing.pivot_px
+        for i, (x, y) in points.items():
+            if i % every == 0:
+                dx, dy = (round(v) for v in self._camera(batch[i]).at(x, y))
+                a, b = max(x0, -dx), max(y0, -dy)
+                c, d = min(x1, self.shape[1] - dx), min(y1, self.shape[0] - dy)
+                if c - a < 4 or d - b < 4:
+                    continue
+                piece = self.sight.window(batch[i], a + dx, b + dy, c + dx, d + dy)
+                self.back.add(piece, (a, b, c, d), (x, y, 1.1 * look.radius_px + 2 * look.edge_px + 2), pivot)
+        self.back.fill_gaps((x0, y0, x1, y1))
+
+    def _learn_looks(
+        self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]], radius: float | None
+    ) -> tuple[Look, float]:
+        """Radius and edge from fits where the bob is slow, the exposure from the streak where it is fast."""
+        numbers = np.array(list(points))
+        vx, vy = self.swing.velocity(np.array([batch[i].t_s for i in numbers]))
+        speed = np.hypot(vx, vy)
+
+        def fit(k: int, look: Look, part: float, **how: bool | int) -> np.ndarray | None:
+            i = numbers[k]
+            guess = self._guess(*points[i], part * vx[k], part * vy[k])
+            patch = self._patch(batch[i], look, guess)
+            return None if patch is None else fit_disc(patch, look, guess, **how)  # type: ignore[arg-type]
+
+        exposure = 0.0
+        for _ in range(2):  # the streak widens the edge, the edge shortens the streak
+            slow = np.argsort(speed)[: max(8, numbers.size // 4)][:16]
+            fits = [f for f in (fit(k, look, exposure, calibrate=True, turns=8) for k in slow) if f is not None]
+            if len(fits) >= 3:
+                middle = np.median(np.array(fits), axis=0)
+                look = Look(radius or middle[2], max(0.35, middle[3]), middle[9], middle[7])
+            if speed.max() * self.interval_s < 1.0:
+                break
+            fast = np.argsort(-speed)[:6]
+            trials = np.linspace(0, 1, 11)
+            cost = np.zeros(trials.size)
+            for j, part in enumerate(trials):
+                for k in fast:
+                    found = fit(k, look, part * self.interval_s, turns=6)
+                    cost[j] += np.inf if found is None else found[7] ** 2
+            if not np.isfinite(cost).any():
+                break
+            j = int(np.argmin(cost))
+            best = trials[j]
+            if 0 < j < trials.size - 1 and np.all(np.isfinite(cost[j - 1 : j + 2])):
+                a, b, c = cost[j - 1 : j + 2]
+                best += 0.1 * 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
+            exposure = float(max(0.0, best) * self.interval_s)
+        return look, exposure
+
+    def _choose(self, batch: list[Frame], points: dict[int, tuple[float, float]], wanted: str | None) -> Localiser:
+        """The localiser asked for; else the disc fit where its model holds; else whichever scatters least about the
+        motion. Also learns how large a misfit is ordinary for it."""
+        names = [wanted] if wanted else ["disc"]
+        if not wanted and self.look.noise > 0.05 * abs(self.look.contrast) + 2.5:
+            names.append("edge")
+        numbers = list(points)
+        vx, vy = (v * self.exposure_s for v in self.swing.velocity(np.array([batch[i].t_s for i in numbers])))
+        best, least = load_tracker(names[0]), np.inf
+        for name in names:
+            candidate = load_tracker(name)
+            found = []
+            for k, i in enumerate(numbers):
+                guess = self._guess(*points[i], float(vx[k]), float(vy[k]))
+                patch = self._patch(batch[i], self.look, guess)
+                place = NOWHERE if patch is None else candidate.locate(patch, self.look, guess)
+                if np.isfinite(place.x_px) and place.visible > 0.8:
+                    found.append((batch[i].t_s, place.x_px, place.y_px, place.misfit))
+            if len(found) < max(10, 0.5 * len(points)):
+                continue
+            t, x, y, misfit = np.array(found).T
+            swing = fit_swing(t, x, y, np.full(t.size, 0.1), _restarted(self.swing, t[0]))
+            if swing is not None and swing.rms_px * (0.9 if name == "disc" else 1.0) < least:
+                best, least = candidate, swing.rms_px * (0.9 if name == "disc" else 1.0)
+                self.ordinary_misfit = float(np.percentile(misfit, 90))
+                self.swing = swing
+        return best
+
+    # --- geometry -------------------------------------------------------------------------------------------------
+
+    def _camera(self, frame: Frame) -> CameraShift:
+        """The camera's shift in this frame; a still camera is only looked at now and then."""
+        if not self.shaking:
+            return STILL
+        known = self._shifts.get(frame.index)
+        if known is None:
+            last = self.record.shift[-1] if self.record.shift else STILL
+            known = self.anchors.shift(frame.luma) or last
+            self._shifts[frame.index] = known
+        return known
+
+    def _guess(self, x: float, y: float, bx: float, by: float) -> Guess:
+        px, py = self.pivot or self.swing.pivot_px
+        return Guess(x, y, bx, by, float(np.arctan2(py - y, px - x)))
+
+    def _patch(self, frame: Frame, look: Look, guess: Guess) -> Patch | None:
+        """The patch about the guess, with the background behind it, in the pixels of a still camera."""
+        half = (
+            1.25 * look.radius_px + 4 * look.edge_px + 4 + 0.5 * float(np.hypot(guess.streak_x_px, guess.streak_y_px))
+        )
+        dx, dy = self._camera(frame).at(guess.x_px, guess.y_px)
+        patch = cut(frame, self.sight, guess.x_px + dx, guess.y_px + dy, half)
+        if patch is None:
+            return None
+        rows, columns = patch.image.shape
+        x0, y0 = int(patch.x_px) - round(dx), int(patch.y_px) - round(dy)
+        if not self.shaking:
+            window = (slice(y0, y0 + rows), slice(x0, x0 + columns))
+            return patch._replace(back=self.back.mean[window], seen=self.back.seen[window])
+        back, seen = self.back.window(x0, y0, columns, rows, dx - round(dx), dy - round(dy))
+        return Patch(patch.image, back, seen, patch.x_px - dx, patch.y_px - dy)
+
+    # --- following ------------------------------------------------------------------------------------------------
+
+    def follow(self, frame: Frame) -> None:
+        """Measure one frame, in the order of the file."""
+        x, y, vx, vy = self._expect(frame.t_s)
+        guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
+        patch = self._patch(frame, self.look, guess)
+        place = NOWHERE if patch is None else self._locate(patch, guess)
+        ok = self._believe(place, x, y)
+        r = self.record
+        shift = self._camera(frame)
+        r.index.append(frame.index)
+        r.t_s.append(frame.t_s)
+        r.place.append(place)
+        r.ok.append(ok)
+        r.shift.append(shift)
+        r.repeated.append(self._is_repeat(frame))
+        if ok and patch is not None:
+            self.hidden = 0
+            self.recent.append((frame.t_s, place.x_px, place.y_px))
+            self._update_background(patch, place, guess)
+            if len(r.index) % _STRING_EVERY == 1:
+                self._measure_string(frame, place, shift)
+        else:
+            self.hidden += 1
+            if self.hidden == 2:
+                self._refit()
+
+    def _locate(self, patch: Patch, guess: Guess) -> Place:
+        if not self.hidden and len(self.recent) == 3:
+            place = self.localiser.locate(patch, self.look, guess)
+            if np.isfinite(place.x_px):
+                return place
+        wide = fit_disc(patch, self.look._replace(noise=np.inf), guess, soften=2.5, turns=12)
+        if wide is None:
+            return NOWHERE
+        near = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
+        return self.localiser.locate(patch, self.look, near)
+
+    def _believe(self, place: Place, x: float, y: float) -> bool:
+        look = self.look
+        if not np.isfinite(place.x_px):
+            return False
+        return bool(
+            place.visible >= 0.85
+            and place.misfit < 2 * self.ordinary_misfit + 0.03 * abs(look.contrast)
+            and 0.5 < place.contrast / look.contrast < 2.0
+            and np.hypot(place.x_px - x, place.y_px - y) < 0.6 * look.radius_px + 2
+        )
+
+    def _expect(self, t: float) -> tuple[float, float, float, float]:
+        """Where the bob should be at time t and how fast, px and px/s."""
+        recent = list(self.recent)
+        step = self.interval_s
+        if self.hidden < 2 and len(recent) == 3 and t - recent[0][0] < 6 * step:
+            x, y = extrapolate(recent, t)
+            x1, y1 = extrapolate(recent, t + 0.5 * step)
+            x0, y0 = extrapolate(recent, t - 0.5 * step)
+            return x, y, (x1 - x0) / step, (y1 - y0) / step
+        at = np.array([t])
+        (px, py), (vx, vy) = self.swing.position(at), self.swing.velocity(at)
+        return float(px[0]), float(py[0]), float(vx[0]), float(vy[0])
+
+    def _refit(self) -> None:
+        """Fit the motion to what was measured last, to see through a gap."""
+        r = self.record
+        good = [k for k in range(max(0, len(r.ok) - 600), len(r.ok)) if r.ok[k]]
+        if len(good) < 20:
+            return
+        t, x, y = np.array([(r.t_s[k], r.place[k].x_px, r.place[k].y_px) for k in good]).T
+        swing = fit_swing(t, x, y, np.full(t.size, 0.1), _restarted(self.swing, t[0]))
+        if swing is not None and swing.rms_px < 0.25 * self.look.radius_px + 1:
+            self.swing = swing
+
+    def _update_background(self, patch: Patch, place: Place, guess: Guess) -> None:
+        rows, columns = patch.image.shape
+        dx, dy = patch.x_px - round(patch.x_px), patch.y_px - round(patch.y_px)
+        if abs(dx) > 0.2 or abs(dy) > 0.2:
+            return  # a shaken frame that lies between the background's pixels would blur it
+        x0, y0 = round(patch.x_px), round(patch.y_px)
+        if x0 < 0 or y0 < 0 or x0 + columns > self.shape[1] or y0 + rows > self.shape[0]:
+            return
+        streak = 0.5 * float(np.hypot(guess.streak_x_px, guess.streak_y_px))
+        keep_out = 1.05 * self.look.radius_px + 3 * self.look.edge_px + 1 + streak
+        box = (x0, y0, x0 + columns, y0 + rows)
+        self.back.add(patch.image, box, (place.x_px, place.y_px, keep_out), self.pivot or self.swing.pivot_px)
+
+    def _measure_string(self, frame: Frame, place: Place, shift: CameraShift) -> None:
+        px, py = self.pivot or self.swing.pivot_px
+        dx, dy = shift.at(place.x_px, place.y_px)
+        qx, qy = shift.at(px, py)
+        bob = (place.x_px + dx, place.y_px + dy)
+        line = measure_string(frame.luma, bob, (px + qx, py + qy), self.look.radius_px)
+        if line is not None:
+            sx, sy = shift.at(line.x_px, line.y_px)
+            self.record.string[len(self.record.index) - 1] = (
+                line.x_px - sx,
+                line.y_px - sy,
+                line.angle_rad + shift.roll_rad,
+                line.sigma_angle_rad,
+                line.sigma_px,
+            )
+
+    def _is_repeat(self, frame: Frame) -> bool:
+        """Is it the picture before, shown again?"""
+        coarse = frame.luma[4::16, 4::16].astype(np.int16)
+        before, self._print = self._print, coarse
+        return before is not None and bool(np.abs(coarse - before).max() <= 1)
+
+
+def _restarted(swing: Swing, t0: float) -> np.ndarray:
+    """The motion's values with its state at time t0."""
+    theta, rate = swing.angle(np.array([t0]))
+    values = swing.values.copy()
+    values[7:] = theta[0], rate[0]
+    return values

@@ -1,0 +1,187 @@
+"""How the camera moved: shift and roll of the still background between the first frame and any other.
+
+Small windows on the background's best corners are followed by Lucas–Kanade (inverse compositional, gradients of the
+first frame); a shift and a roll are fitted to them, windows that disagree (something passed before them) are left out.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class CameraShift(NamedTuple):
+    """Shift (px) and roll (rad) about `centre` of the picture against the first frame, and the shift's uncertainty."""
+
+    x_px: float
+    y_px: float
+    roll_rad: float
+    centre_x_px: float
+    centre_y_px: float
+    sigma_px: float
+
+    def at(self, x_px: float, y_px: float) -> tuple[float, float]:
+        """How far the still point that was at (x, y) in the first frame has moved."""
+        dx, dy = x_px - self.centre_x_px, y_px - self.centre_y_px
+        return self.x_px - self.roll_rad * dy, self.y_px + self.roll_rad * dx
+
+
+STILL = CameraShift(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_HALF = 12
+_WORST_SIGMA_PX = 0.15
+
+
+class Anchors:
+    """Windows of the first frame that stand still, and their shift in any other frame."""
+
+    def __init__(self, luma: np.ndarray, moving: np.ndarray, most: int = 24) -> None:
+        """`moving` (h, w) bool is True where the bob or the string may come."""
+        import cv2
+
+        picture = np.ascontiguousarray(luma)
+        mask = np.where(moving, 0, 255).astype(np.uint8)
+        rim = _HALF + 4
+        mask[:rim], mask[-rim:], mask[:, :rim], mask[:, -rim:] = 0, 0, 0, 0
+        smooth = cv2.GaussianBlur(picture, (0, 0), 1.0)
+        corners = cv2.goodFeaturesToTrack(smooth, most, 0.01, 2.0 * _HALF, mask=mask, blockSize=9)
+        points = np.zeros((0, 2)) if corners is None else corners.reshape(-1, 2)
+        noise = 1.0 + _pixel_noise(picture)
+        points = np.array([p for p in points if _place_sigma(smooth, p, noise) < _WORST_SIGMA_PX]).reshape(-1, 2)
+        self.points = np.round(points).astype(np.int64)
+        self.windows = np.zeros((len(self.points), 2 * _HALF + 1, 2 * _HALF + 1), np.float32)
+        for k, (x, y) in enumerate(self.points):
+            self.windows[k] = smooth[y - _HALF : y + _HALF + 1, x - _HALF : x + _HALF + 1]
+        self.centre = (luma.shape[1] / 2, luma.shape[0] / 2)
+        self._last = np.zeros((len(self.points), 2))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def shift(self, luma: np.ndarray) -> CameraShift | None:
+        """The camera's shift in this frame; None where the windows are too few or disagree."""
+        n = len(self.points)
+        if n < 2:
+            return None
+        moved = np.zeros((n, 4))
+        _compiled()(luma, self.windows, self.points, self._last, moved)
+        good = moved[:, 3] > 0
+        sigma = np.sqrt(moved[:, 2] ** 2 + 0.01**2)
+        middle = np.median(moved[good, :2], axis=0)
+        off = np.hypot(*(moved[:, :2] - middle).T)
+        limit = max(1.0, 3 * float(np.median(off[good])))
+        good &= off < limit
+        if good.sum() < 2:
+            return None  # one window alone may sit on something that moves
+        weight = np.where(good, 1 / sigma**2, 0.0)
+        dx, dy = self.points[:, 0] - self.centre[0], self.points[:, 1] - self.centre[1]
+        spread = float(np.sqrt(np.average(dx * dx + dy * dy, weights=weight)))
+        roll = 0.0
+        if good.sum() >= 4 and spread > 80:
+            one, nil = np.ones(n), np.zeros(n)
+            design = np.concatenate([np.column_stack([one, nil, -dy]), np.column_stack([nil, one, dx])])
+            value = np.concatenate([moved[:, 0], moved[:, 1]])
+            for _ in range(3):
+                w = np.sqrt(np.concatenate([weight, weight]))
+                a = np.linalg.lstsq(design * w[:, None], value * w, rcond=None)[0]
+                rest = (value - design @ a).reshape(2, n)
+                size = np.hypot(*rest)
+                weight = np.where(good & (size < max(0.3, 3 * float(np.median(size[good])))), 1 / sigma**2, 0.0)
+                if not (weight > 0).any():
+                    return None
+            x, y, roll = (float(v) for v in a)
+            used = weight > 0
+            scatter = float(np.sqrt(np.mean(rest[:, used] ** 2) / max(1, used.sum() - 1.5)))
+        else:
+            x, y = (float(np.average(moved[:, i], weights=weight)) for i in range(2))
+            scatter = float(1 / np.sqrt(weight.sum()))
+        self._last[:, 0] = x - roll * dy
+        self._last[:, 1] = y + roll * dx
+        return CameraShift(x, y, roll, *self.centre, max(scatter, 1e-3))
+
+
+def _pixel_noise(picture: np.ndarray) -> float:
+    """Noise of single pixels in grey levels, from the median of their second differences."""
+    some = picture[::4].astype(np.float32)
+    return 1.4826 * float(np.median(np.abs(some[:, 2:] - 2 * some[:, 1:-1] + some[:, :-2]))) / np.sqrt(6)
+
+
+def _place_sigma(smooth: np.ndarray, point: np.ndarray, noise: float) -> float:
+    """How well noise lets the window at the point be placed, px, along its worse direction."""
+    x, y = (round(float(v)) for v in point)
+    window = smooth[y - _HALF : y + _HALF + 1, x - _HALF : x + _HALF + 1].astype(float)
+    gy, gx = np.gradient(window)
+    normal = np.array([[np.sum(gx * gx), np.sum(gx * gy)], [np.sum(gx * gy), np.sum(gy * gy)]])
+    return noise / float(np.sqrt(max(np.linalg.eigvalsh(normal)[0], 1e-9)))
+
+
+@cache
+def _compiled() -> Any:
+    import numba
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def follow(luma, windows, points, start, moved):  # type: ignore[no-untyped-def]
+        rows, columns = luma.shape
+        size = windows.shape[1]
+        half = size // 2
+        for k in range(points.shape[0]):
+            window = windows[k]
+            n00 = n01 = n11 = 0.0
+            for v in range(1, size - 1):
+                for u in range(1, size - 1):
+                    gx = 0.5 * (window[v, u + 1] - window[v, u - 1])
+                    gy = 0.5 * (window[v + 1, u] - window[v - 1, u])
+                    n00 += gx * gx
+                    n01 += gx * gy
+                    n11 += gy * gy
+            determinant = n00 * n11 - n01 * n01
+            moved[k, 3] = 0.0
+            if not determinant > 1e-6 * n00 * n11:
+                continue
+            sx, sy = start[k, 0], start[k, 1]
+            settled = False
+            squares = 0.0
+            for turn in range(12):
+                x0 = points[k, 0] - half + sx
+                y0 = points[k, 1] - half + sy
+                ix, iy = int(np.floor(x0)), int(np.floor(y0))
+                if ix < 0 or iy < 0 or ix + size + 1 >= columns or iy + size + 1 >= rows:
+                    break
+                fx, fy = x0 - ix, y0 - iy
+                level = 0.0
+                r0 = r1 = 0.0
+                g0 = g1 = 0.0
+                squares = 0.0
+                count = 0
+                for v in range(1, size - 1):
+                    for u in range(1, size - 1):
+                        top = luma[iy + v, ix + u] * (1 - fx) + luma[iy + v, ix + u + 1] * fx
+                        bottom = luma[iy + v + 1, ix + u] * (1 - fx) + luma[iy + v + 1, ix + u + 1] * fx
+                        rest = top * (1 - fy) + bottom * fy - window[v, u]
+                        gx = 0.5 * (window[v, u + 1] - window[v, u - 1])
+                        gy = 0.5 * (window[v + 1, u] - window[v - 1, u])
+                        r0 += gx * rest
+                        r1 += gy * rest
+                        g0 += gx
+                        g1 += gy
+                        level += rest
+                        squares += rest * rest
+                        count += 1
+                level /= count
+                r0 -= level * g0
+                r1 -= level * g1
+                dx = -(r0 * n11 - r1 * n01) / determinant
+                dy = -(r1 * n00 - r0 * n01) / determinant
+                sx += min(3.0, max(-3.0, dx))
+                sy += min(3.0, max(-3.0, dy))
+                if abs(dx) < 0.01 and abs(dy) < 0.01:
+                    settled = True
+                    squares -= count * level * level
+                    break
+            if settled:
+                moved[k, 0], moved[k, 1] = sx, sy
+                moved[k, 2] = np.sqrt(squares / count * (n00 + n11) / determinant)
+                moved[k, 3] = 1.0
+
+    return follow

@@ -1,0 +1,158 @@
+"""The string as a straight line: its direction in one frame, to a few thousandths of a degree.
+
+Least squares of a ridge of Gaussian profile to cross-sections between the bob and the pivot, each on its own level
+(the mean of its ends), first on the piece near the bob, then on the whole length.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class StringLine(NamedTuple):
+    """A point on the string (px), the direction pivot → bob (rad from the downward image axis, positive to the
+    right), the standard uncertainties of the direction and of the line's place at the point, and the ridge's height
+    over its own uncertainty."""
+
+    x_px: float
+    y_px: float
+    angle_rad: float
+    sigma_angle_rad: float
+    sigma_px: float
+    strength: float
+
+
+def measure_string(
+    luma: np.ndarray, bob: tuple[float, float], pivot: tuple[float, float], radius_px: float
+) -> StringLine | None:
+    """The string in one frame from where bob and pivot are thought to be; None where no string is seen."""
+    out = np.zeros(6)
+    if not _compiled()(luma, bob[0], bob[1], pivot[0], pivot[1], radius_px, out):
+        return None
+    line = StringLine(*(float(v) for v in out))
+    return line if line.strength > 8 and np.all(np.isfinite(out)) else None
+
+
+@cache
+def _compiled() -> Any:
+    import numba
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def ridge(luma, bx, by, px, py, radius, out):  # type: ignore[no-untyped-def]
+        rows, columns = luma.shape
+        ux, uy = px - bx, py - by
+        length = np.sqrt(ux * ux + uy * uy)
+        if length < 2.0 * radius + 20.0:
+            return False
+        ux, uy = ux / length, uy / length
+        start = radius + 6.0 + 0.15 * radius
+        a = b = 0.0  # the line: across = a + b (along − middle)
+        width2 = 1.5 * 1.5
+        height = 0.0
+        profile = np.empty(17)
+        for stage in range(3):
+            end = length - 4.0
+            if stage == 0:
+                end = min(end, start + 60.0)
+            elif stage == 1:
+                end = min(end, start + 200.0)
+            middle = 0.5 * (start + end)
+            if end - start < 15.0:
+                return False
+            # a was the place at the former middle: carry it along
+            a0 = a + b * (middle - out[5]) if stage > 0 else 0.0
+            out[5] = middle
+            a = a0
+            sections = int(min(100.0, end - start))
+            for turn in range(3):
+                n00 = n01 = n11 = r0 = r1 = 0.0
+                # the height of the ridge is fitted with the line held, then the line with the height held
+                hh = hp = 0.0
+                squares = 0.0
+                count = 0
+                used = 0
+                for pass_ in range(2):
+                    for k in range(sections):
+                        along = start + (k + 0.5) * (end - start) / sections
+                        across = a + b * (along - middle)
+                        qx, qy = bx + ux * along, by + uy * along
+                        level = 0.0
+                        inside = True
+                        for j in range(17):
+                            q = j - 8.0
+                            x = qx - uy * (across + q)
+                            y = qy + ux * (across + q)
+                            ix, iy = int(np.floor(x)), int(np.floor(y))
+                            if ix < 0 or iy < 0 or ix >= columns - 1 or iy >= rows - 1:
+                                inside = False
+                                break
+                            fx, fy = x - ix, y - iy
+                            top = luma[iy, ix] * (1 - fx) + luma[iy, ix + 1] * fx
+                            bottom = luma[iy + 1, ix] * (1 - fx) + luma[iy + 1, ix + 1] * fx
+                            profile[j] = top * (1 - fy) + bottom * fy
+                        if not inside:
+                            continue
+                        tilt = 0.0
+                        for j in range(3):
+                            level += profile[j] + profile[16 - j]
+                            tilt += profile[16 - j] - profile[j]
+                        level /= 6.0
+                        tilt /= 42.0
+                        if pass_ == 0:
+                            used += 1
+                            for j in range(3, 14):
+                                q = j - 8.0
+                                g = np.exp(-q * q / (2 * width2))
+                                hh += g * g
+                                hp += g * (profile[j] - level - tilt * q)
+                        else:
+                            lever = along - middle
+                            for j in range(3, 14):
+                                q = j - 8.0
+                                g = np.exp(-q * q / (2 * width2))
+                                rest = profile[j] - level - tilt * q - height * g
+                                if abs(rest) > 1.5 * abs(height) + 12.0:
+                                    continue
+                                slope = height * g * q / width2
+                                n00 += slope * slope
+                                n01 += slope * slope * lever
+                                n11 += slope * slope * lever * lever
+                                r0 += slope * rest
+                                r1 += slope * rest * lever
+                                squares += rest * rest
+                                count += 1
+                    if pass_ == 0:
+                        if used < 12:
+                            return False
+                        height = hp / hh
+                determinant = n00 * n11 - n01 * n01
+                if count < 60 or not determinant > 1e-12 * n00 * n11:
+                    return False
+                da = (r0 * n11 - r1 * n01) / determinant
+                db = (r1 * n00 - r0 * n01) / determinant
+                a += min(2.0, max(-2.0, da))
+                b += min(0.05, max(-0.05, db))
+                if abs(da) < 0.02 and abs(db) * (end - start) < 0.02:
+                    break
+            noise = np.sqrt(squares / count)
+            if abs(height) * np.sqrt(hh) < 8.0 * noise or abs(height) < 1.5:
+                return False
+        # decorrelate: the point at which place and direction are independent
+        lever = n01 / n00
+        at = middle + lever
+        across = a + b * lever
+        # across is along (−uy, ux); the line's direction from bob to pivot turns by b towards it
+        dx, dy = ux - uy * b, uy + ux * b
+        norm = np.sqrt(dx * dx + dy * dy)
+        out[0] = bx + ux * at - uy * across
+        out[1] = by + uy * at + ux * across
+        out[2] = np.arctan2(-dx / norm, -dy / norm)
+        out[3] = noise / np.sqrt(max(1e-30, n11 - n01 * n01 / n00))
+        out[4] = noise / np.sqrt(n00)
+        out[5] = abs(height) * np.sqrt(hh) / noise
+        return True
+
+    return ridge

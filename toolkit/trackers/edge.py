@@ -1,0 +1,83 @@
+"""Edge fit: where the outline is crossed along rays from the centre, and the circle through these points.
+
+It asks nothing of the inside of the bob, so a pattern or a highlight does not disturb it; motion blur does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
+
+_RAYS = 72
+
+
+def locate(patch: Patch, look: Look, guess: Guess) -> Place:
+    """The centre of the circle through the outline; each crossing is the centroid of the brightness step on its ray."""
+    cx, cy = guess.x_px - patch.x_px, guess.y_px - patch.y_px
+    streak = float(np.hypot(guess.streak_x_px, guess.streak_y_px))
+    width = min(0.7 * look.radius_px, 3 * look.edge_px + 3 + 0.5 * streak)
+    angles = (np.arange(_RAYS) + 0.5) * 2 * np.pi / _RAYS
+    if np.isfinite(guess.string_rad):
+        half = min(0.9, 0.2 + 3.0 / look.radius_px)
+        angles = angles[np.abs((angles - guess.string_rad + np.pi) % (2 * np.pi) - np.pi) > half]
+    ux, uy = np.cos(angles), np.sin(angles)
+    sign = -np.sign(look.contrast) or 1.0
+    radius = look.radius_px
+    r = np.arange(radius - width, radius + width + 0.25, 0.5)
+    for turn in range(4):
+        x, y = cx + ux[:, None] * r, cy + uy[:, None] * r
+        inside = (x >= 0) & (y >= 0) & (x < patch.image.shape[1] - 1.001) & (y < patch.image.shape[0] - 1.001)
+        profile = _sampled(patch.image, x, y)
+        rise = np.clip(sign * np.diff(profile, axis=1), 0, None)
+        middle = 0.5 * (r[1:] + r[:-1])
+        rise[~(inside[:, 1:] & inside[:, :-1])] = 0
+        peak = np.argmax(_blurred(rise), axis=1)
+        near = np.abs(middle[None, :] - middle[peak][:, None]) <= 1.5 + 2 * look.edge_px + 0.3 * streak
+        weight = rise * near
+        height = weight.sum(axis=1)
+        good = height > 0.35 * abs(look.contrast) if look.contrast else height > 0.5 * np.median(height)
+        if good.sum() < 12:
+            return NOWHERE
+        found = np.where(good, (weight * middle).sum(axis=1) / np.maximum(height, 1e-9), np.nan)
+        keep = good.copy()
+        design = np.column_stack([ux, uy, np.ones(ux.size)])
+        for _ in range(3):
+            a = np.linalg.lstsq(design[keep], found[keep], rcond=None)[0]
+            rest = found - design @ a
+            spread = 1.4826 * float(np.median(np.abs(rest[keep]))) + 0.02
+            keep = good & (np.abs(rest) < 3.5 * spread)
+            if keep.sum() < 10:
+                return NOWHERE
+        step = float(np.hypot(a[0], a[1]))
+        cx, cy = cx + float(a[0]), cy + float(a[1])
+        if step < 0.02:
+            break
+        if turn == 3 and step > 0.3:
+            return NOWHERE
+    scatter = float(np.sqrt(np.sum(rest[keep] ** 2) / max(1, keep.sum() - 3)))
+    covariance = np.linalg.inv(design[keep].T @ design[keep]) * scatter**2
+    sigma = np.sqrt(np.diag(covariance))
+    slope = float(np.median(height[keep])) / max(1.0, 2.5 * look.edge_px)
+    contrast = -sign * float(np.median(height[keep]))
+    return Place(
+        cx + patch.x_px, cy + patch.y_px, max(float(sigma[0]), 1e-4), max(float(sigma[1]), 1e-4), scatter * slope,
+        float(keep.mean()), contrast,
+    )  # fmt: skip
+
+
+def _sampled(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Bilinear values of the image at (x, y)."""
+    ix = np.clip(x.astype(int), 0, image.shape[1] - 2)
+    iy = np.clip(y.astype(int), 0, image.shape[0] - 2)
+    fx, fy = x - ix, y - iy
+    top = image[iy, ix] * (1 - fx) + image[iy, ix + 1] * fx
+    bottom = image[iy + 1, ix] * (1 - fx) + image[iy + 1, ix + 1] * fx
+    return top * (1 - fy) + bottom * fy
+
+
+def _blurred(rows: np.ndarray) -> np.ndarray:
+    return rows + np.pad(rows, ((0, 0), (1, 0)))[:, :-1] + np.pad(rows, ((0, 0), (0, 1)))[:, 1:]
+
+
+LOCALISER = Localiser("edge", "circle through the sub-pixel outline; for bobs with a pattern or a highlight", locate)
