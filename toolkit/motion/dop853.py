@@ -187,8 +187,8 @@ def integrate(
         begun = True
         for d in range(m):
             y[d] = last[d]
-        y[m - 2] += math.copysign(0.3 * error, y[m - 2]) + 1.1e-16 * abs(y[0])
-        y[m - 1] += math.copysign(0.3 * error, y[m - 1])
+        y[m - 2] += math.copysign(0.8 * error, y[m - 2]) + 1.1e-16 * abs(y[0])
+        y[m - 1] += math.copysign(0.8 * error, y[m - 1])
         worst = max(worst, abs(y[m - 2]))
         if turned:
             y[1] = 0.0

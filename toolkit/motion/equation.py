@@ -29,7 +29,7 @@ from toolkit.registry import did_you_mean
 from toolkit.trajectory import Event, SolveCost
 
 START = ("theta0_rad", "omega0_rad_per_s")
-_VERSION = 4  # of the generated code: a change here makes old caches unused
+_VERSION = 5  # of the generated code: a change here makes old caches unused
 
 
 @dataclass(frozen=True)

@@ -293,13 +293,17 @@ def integrate(
             D[a * ROW] = _polynomial(D, a * ROW, n, h)
         error_theta = _polynomial(D, at, rough, h)
         error_w = _polynomial(D, at + ROW, rough, h)
-        power = h**n
+        power = h ** (n - 1)
         seed = (seed * 1103515245 + 12345) % 2147483648
         noise = 0.5 if seed < 1073741824 else -0.5  # rounding errors add like a random walk
-        local = 0.25 * power
+        local = 0.3 * power
         rounding = 2.2e-16 * noise
-        error_theta += math.copysign(local * abs(W[n]), error_theta) + rounding * abs(theta)
-        error_w += math.copysign(local * abs(W[ROW + n]), error_w) + rounding * abs(w)
+        error_theta += math.copysign(local * max(h * abs(W[n]), 0.5 * abs(W[n - 1])), error_theta) + rounding * abs(
+            theta
+        )
+        error_w += math.copysign(local * max(h * abs(W[ROW + n]), 0.5 * abs(W[ROW + n - 1])), error_w) + rounding * abs(
+            w
+        )
         worst = max(worst, abs(error_theta))
         if turned:
             w, w_lo, resting = 0.0, 0.0, True
