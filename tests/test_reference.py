@@ -9,7 +9,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from toolkit.cost.reference import ExactPendulum, solve_exactly
+from toolkit.cost._reference import ExactPendulum, solve_exactly
 
 
 def test_bare_pendulum_is_the_elliptic_function():

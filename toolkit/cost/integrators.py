@@ -96,6 +96,29 @@ def problems() -> tuple[Problem, ...]:
     )  # fmt: skip
 
 
+def random_problem(seed: int, number: int) -> Problem:
+    """A random scene, the same for the same numbers: drags and a drive of any strength, swings, turns and near-standing starts.
+
+    Its motion is known to many digits (see `true_angles`); it spans 1 to 20 natural periods and 5 to 1500 samples.
+    """
+    random = np.random.default_rng([seed, number])
+    mass, length, g = 10 ** random.uniform(-2, 0), 10 ** random.uniform(-1, 0.5), random.uniform(1, 20)
+    rate = math.sqrt(g / length)
+    effects: dict[str, dict[str, float]] = {}
+    if random.random() < 0.5:
+        effects["linear_drag"] = {"k_d_kg_per_s": 2 * mass * rate * 10 ** random.uniform(-4, 1)}
+    if random.random() < 0.5:
+        effects["quadratic_drag"] = {"c_kg_per_m": mass / length * 10 ** random.uniform(-4, 0.5)}
+    if random.random() < 0.4:
+        f0, f = mass * g * 10 ** random.uniform(-2, 0.5), rate / (2 * math.pi) * 10 ** random.uniform(-1, 0.5)
+        effects["cosine_drive"] = {"f0_n": f0, "f_hz": f, "phase_rad": 0.0}
+    start = random.uniform(-3.1, 3.1) if random.random() < 0.7 else float(random.choice([0.0, 1e-3, 3.14159, 1e-9]))
+    push = 0.0 if random.random() < 0.6 else 2 * rate * random.normal()
+    scene = Scene(Pendulum(mass, length), Release(start, push), Environment(g_m_per_s2=g), effects)
+    duration, samples = 2 * math.pi / rate * random.uniform(1, 20), int(random.integers(5, 1500))
+    return Problem(f"random {seed}/{number}", ", ".join(effects) or "bare", scene, duration, samples, duration)
+
+
 def measure(folder: str | Path, quick: bool = False, progress: Progress = silent) -> str:
     """Measure, write integrators.csv, ratios.csv, integrators.txt and work_precision.png/.svg into `folder`; return the text."""
     folder = Path(folder)
@@ -142,7 +165,7 @@ def measure_integrators(quick: bool = False, progress: Progress = silent) -> Mea
                 if run is not None and run.cpu_ms > (500 if quick else 10_000):
                     break  # tighter settings of this method would cost more than they tell
     progress("first calls in fresh processes, compiling", len(chosen) / (len(chosen) + 1))
-    return Measured(chosen, tuple(runs), first_calls())
+    return Measured(chosen, tuple(runs), first_calls(("P1", "L") if quick else ("P1", "P2", "L")))
 
 
 def _peers_for(problem: Problem) -> tuple[str, ...]:
@@ -249,7 +272,7 @@ def _slope(scene: Scene) -> Callable[[float, Any], tuple[float, float]]:
 
 def _coefficients(scene: Scene) -> tuple[float, float, float, float, float]:
     exact = _exact_coefficients(scene)
-    return (*(float(v) for v in exact[:4]), 2 * math.pi * float(exact[4]))  # type: ignore[return-value]
+    return (*(float(v) for v in exact[:4]), 2 * math.pi * float(exact[4]))
 
 
 def _exact_coefficients(scene: Scene) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
@@ -332,7 +355,7 @@ def true_angles(problem: Problem, most: int = 1500) -> tuple[np.ndarray, np.ndar
         return judged, _true_slack(problem.scene, t)
     if problem.scene.approximations.small_angle:
         return judged, _true_linear(problem.scene, t)
-    from toolkit.cost.reference import ExactPendulum, solve_exactly
+    from toolkit.cost._reference import ExactPendulum, solve_exactly
 
     two_alpha, beta, gravity, drive, f_hz = _exact_coefficients(problem.scene)
     exact = ExactPendulum(gravity, two_alpha, beta, drive, f_hz=f_hz)
@@ -483,7 +506,7 @@ def _describe(measured: Measured, table: list[dict[str, Any]], quick: bool) -> s
         missed = [
             f"{r.setting:.0e} → {r.error_rad:.1e}" for r in ours if r.error_rad > r.setting and r.setting >= 0.9e-11
         ]
-        routes = ", ".join(sorted({r.route for r in ours}))
+        routes = _routes([r.route for r in ours])
         lines.append(
             f"  {problem.name}: {'reached 1e-3 … 1e-11' if not missed else 'missed ' + ', '.join(missed)}; {routes}"
         )
@@ -499,6 +522,14 @@ def _describe(measured: Measured, table: list[dict[str, Any]], quick: bool) -> s
     if quick:
         lines += ["", "a quick run: shorter P3, P4 and D, fewer tolerances; leave out --quick for the full tables"]
     return "\n".join(lines)
+
+
+def _routes(names: list[str]) -> str:
+    """Routes without repetition; orders of the series as a range."""
+    series = "Taylor series of order "
+    orders = sorted({int(n.removeprefix(series)) for n in names if n.startswith(series)})
+    others = sorted({n for n in names if not n.startswith(series)})
+    return ", ".join([*others, *([f"{series}{orders[0]} … {orders[-1]}"] if orders else [])])
 
 
 _STYLES = {

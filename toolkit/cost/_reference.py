@@ -36,9 +36,17 @@ def solve_exactly(
     problem: ExactPendulum, theta0: float, omega0: float, times: Sequence[float]
 ) -> tuple[list[float], list[float]]:
     """θ and θ̇ at the increasing times ≥ 0, correctly rounded as far as 1e-24 a step allows."""
-    solver = _Solver(problem, Fraction(theta0), Fraction(omega0))
+    theta, omega = solve_to_many_digits(problem, Fraction(theta0), Fraction(omega0), times)
+    return [float(v) for v in theta], [float(v) for v in omega]
+
+
+def solve_to_many_digits(
+    problem: ExactPendulum, theta0: Fraction, omega0: Fraction, times: Sequence[float]
+) -> tuple[list[Fraction], list[Fraction]]:
+    """The same, not rounded: for differences between neighbouring solutions."""
+    solver = _Solver(problem, theta0, omega0)
     pairs = [solver.state_at(Fraction(t)) for t in times]
-    return [p[0] for p in pairs], [p[1] for p in pairs]
+    return [Fraction(p[0], _ONE) for p in pairs], [Fraction(p[1], _ONE) for p in pairs]
 
 
 class _Solver:
@@ -54,12 +62,12 @@ class _Solver:
         self.theta, self.omega = [_fixed(theta0)], [_fixed(omega0)]
         self._expand()
 
-    def state_at(self, time: Fraction) -> tuple[float, float]:
+    def state_at(self, time: Fraction) -> tuple[int, int]:
         at = _fixed(time)
         while at > self.start + self.step:
             self._advance()
         s = at - self.start
-        return _value(self.theta, s) / _ONE, _value(self.omega, s) / _ONE
+        return _value(self.theta, s), _value(self.omega, s)
 
     def _advance(self) -> None:
         end = self.step
