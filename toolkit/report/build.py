@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.errors import PendulabError
 from toolkit.report.document import Block, Equation, Fact, Figure, Paragraph, Report, Section, Table, Verdict
 from toolkit.report.material import PAPER, Material, parameter, value
-from toolkit.report.numbers import number, percent, with_uncertainty
+from toolkit.report.numbers import bare, number, percent, with_uncertainty
 from toolkit.report.words import Words, load_words
 
 if TYPE_CHECKING:
@@ -224,7 +225,20 @@ def _said(words: Words, kind: str, finding: Finding, otherwise: str) -> str:
         return otherwise
 
 
-_SHARES = ("share", "visible_share", "share_bound", "decay", "period_shift")
+_SHARES = frozenset(
+    [
+        "share",
+        "visible_share",
+        "share_bound",
+        "share_at_end",
+        "slack_share",
+        "decay",
+        "period_shift",
+        "rate_change",
+        "scale",
+        "scale_u",
+    ]
+)
 
 
 def _shown(values: Any) -> dict[str, str]:
@@ -238,8 +252,10 @@ def _shown(values: Any) -> dict[str, str]:
         if key.endswith("_rad"):
             shown[key.removesuffix("_rad") + "_deg"] = number(math.degrees(found), 3)
             shown[key.removesuffix("_rad") + "_mrad"] = number(1e3 * found, 2)
+        if key.endswith("_s"):
+            shown[key.removesuffix("_s") + "_ms"] = number(1e3 * found, 2)
         if key in _SHARES or key.endswith(("_share", "_relative")):
-            shown[key + "_percent"] = percent(float(found))
+            shown[key + "_percent"] = percent(abs(float(found)))
     return shown
 
 
@@ -368,7 +384,81 @@ def _models(material: Material) -> Section:
 
 
 def _budget(material: Material) -> Section | None:
-    return None
+    """A GUM budget of the first drag coefficient, of T₀ and of the equivalent length, with what the fit cannot know."""
+    words, result = material.words, material.full_sine if material.full_sine.success else material.best
+    names = [n for n in DRAGS if (p := parameter(result, n)) is not None and p.stderr and p.value > p.stderr][:1]
+    names += [n for n in ("T0", "equivalent_length") if parameter(result, n) is not None]
+    tables = [table for name in names if (table := _budget_table(material, result, name)) is not None]
+    if not tables:
+        return None
+    return Section("budget", words("section.budget"), (Paragraph(words("text.budget")), *tables))
+
+
+_CLOCK_HALF_WIDTH = 50e-6
+_G_HALF_WIDTH = 0.026
+_BY_CLOCK = {
+    "T0": 1.0,
+    "equivalent_length": 2.0,
+    "k_d": -1.0,
+    "alpha_d": -1.0,
+    "c": 0.0,
+    "beta": 0.0,
+    "torque": -2.0,
+    "mu": -2.0,
+}
+"""Power of the unit of time in each quantity: how a relative error of the clock passes into it."""
+
+
+def _budget_table(material: Material, result: FitResult, name: str) -> Table | None:
+    from scipy.stats import t as student
+
+    from toolkit.budget import Row, budget
+
+    words, environment = material.words, material.analysis.scene.environment
+    try:
+        drawn = budget(result, name)
+    except PendulabError:
+        return None
+    rows = list(drawn.rows)
+    assumed = [("time_scale", "1", 1.0, _CLOCK_HALF_WIDTH, _BY_CLOCK[name] * drawn.estimate)]
+    if name == "equivalent_length" and environment.g_m_per_s2 is None and environment.latitude_deg is None:
+        g = environment.gravity_m_per_s2
+        assumed.append(("g", "m/s²", g, _G_HALF_WIDTH, drawn.estimate / g))
+    for source, unit, estimate, half, sensitivity in assumed:
+        u = half / math.sqrt(3)
+        if sensitivity and all(row.quantity != source for row in rows):
+            rows.append(Row(source, estimate, unit, u, "B", "rectangular", sensitivity, sensitivity * u, math.inf))
+    statistical = math.sqrt(sum(r.contribution**2 for r in rows if r.kind == "A"))
+    systematic = math.sqrt(sum(r.contribution**2 for r in rows if r.kind == "B"))
+    total = math.hypot(statistical, systematic)
+    fourth = sum(r.contribution**4 / r.dof for r in rows if r.dof > 0)
+    factor = float(student.ppf(0.975, min(total**4 / fourth if fourth > 0 else math.inf, 1e9)))
+    lines = [
+        (
+            words.either(f"budget.{row.quantity}", row.quantity),
+            with_uncertainty(row.estimate, None, row.unit),
+            with_uncertainty(row.u, None, row.unit, 2),
+            row.kind,
+            words(f"budget.{row.distribution}"),
+            number(row.sensitivity, 3),
+            with_uncertainty(abs(row.contribution), None, drawn.unit, 2),
+        )
+        for row in rows
+    ]
+    for key, part in (("statistical_total", statistical), ("systematic_total", systematic), ("total", total)):
+        lines.append((words(f"budget.{key}"), "", "", "", "", "", with_uncertainty(part, None, drawn.unit, 2)))
+    header = tuple(
+        words(f"column.{c}")
+        for c in ("source", "value", "uncertainty", "kind", "distribution", "sensitivity", "contribution")
+    )
+    caption = words(
+        "budget.title",
+        quantity=_symbol(words, name),
+        value=with_uncertainty(drawn.estimate, total, drawn.unit),
+        expanded=with_uncertainty(factor * total, None, drawn.unit, 2),
+        k=number(factor, 3),
+    )
+    return Table(f"budget_{name}", caption, header, tuple(lines), len(lines) - 1)
 
 
 def _findings(material: Material) -> Section | None:
@@ -389,21 +479,14 @@ def _findings(material: Material) -> Section | None:
 
 def _cost(material: Material) -> Section:
     words = material.words
-    rows = tuple(
-        (
-            model_name(words, name),
-            result.method or "–",
-            number(result.cpu_s, 2),
-            words("kind.converged" if result.success else "kind.failed"),
-        )
-        for name, result in material.analysis.fits.items()
-    )
-    header = tuple(words(f"column.{c}") for c in ("model", "solution", "cpu", "status"))
-    return Section(
-        "cost",
-        words("section.cost"),
-        (Paragraph(words("text.cost")), Table("cost", words("caption.cost"), header, rows)),
-    )
+    rows = []
+    for name, result in material.analysis.fits.items():
+        calls = getattr(result.lmfit, "nfev", None)
+        state = words("kind.converged" if result.success else "kind.failed")
+        rows.append((model_name(words, name), result.method or "–", str(calls or "–"), state, number(result.cpu_s, 2)))
+    header = tuple(words(f"column.{c}") for c in ("model", "solution", "calls", "status", "cpu"))
+    table = Table("cost", words("caption.cost"), header, tuple(rows), volatile=(4,))
+    return Section("cost", words("section.cost"), (Paragraph(words("text.cost")), table))
 
 
 def _methods(material: Material) -> Section:
@@ -476,7 +559,27 @@ def _sheets(material: Material) -> dict[str, dict[str, Any]]:
             findings.values(), (finding.assumption, finding.verdict, finding.sentence, finding.remedy)
         ):
             column.append(cell3)
-    return {"data": data, "parameters": parameters, "models": ladder, "findings": findings}
+    return {
+        "data": data,
+        "parameters": parameters,
+        "models": ladder,
+        "findings": findings,
+        "budget": _budget_sheet(material),
+    }
+
+
+def _budget_sheet(material: Material) -> dict[str, list[Any]]:
+    """The budgets of the report as one table of texts."""
+    section = _budget(material)
+    columns: dict[str, list[Any]] = {
+        k: [] for k in ("quantity", "source", "value", "u", "type", "distribution", "sensitivity", "contribution")
+    }
+    for block in section.blocks if section else ():
+        if isinstance(block, Table):
+            for row in block.rows:
+                for column, cell in zip(columns.values(), (block.key.removeprefix("budget_"), *map(bare, row))):
+                    column.append(cell)
+    return columns
 
 
 def model_name(words: Words, name: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,13 +23,27 @@ class Figure:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts under a header. `mark` is the index of the row to stress (the preferred model), if any."""
+    """Rows of texts under a header.
+
+    `mark` is the index of the row to stress (the preferred model), if any. `volatile` are columns that differ from run
+    to run (times taken); the PDF leaves them out, so that the same input gives the same file.
+    """
 
     key: str
     caption: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
+    volatile: tuple[int, ...] = ()
+
+    @property
+    def steady(self) -> Table:
+        """This table without its volatile columns."""
+
+        def kept(row: tuple[str, ...]) -> tuple[str, ...]:
+            return tuple(cell for k, cell in enumerate(row) if k not in self.volatile)
+
+        return replace(self, header=kept(self.header), rows=tuple(map(kept, self.rows)), volatile=())
 
 
 @dataclass(frozen=True)

@@ -112,6 +112,8 @@ class Material:
         """What was solved for `result`, to evaluate its motion at other times; None where that is not possible."""
         from toolkit.problem import pose
 
+        if result.problem is not None:
+            return result.problem
         try:
             return pose(self.analysis.series, self.analysis.scene, result.model)
         except PendulabError:  # a fit made otherwise: its figures are drawn at the measured times

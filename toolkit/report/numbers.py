@@ -57,7 +57,7 @@ def with_uncertainty(value: float, u: float | None, unit: str = "", digits: int 
 def _joined(text: str, unit: str) -> str:
     if not unit:
         return text
-    return text + unit if unit in ("°", "%") else f"{text} {unit}"
+    return text + unit if unit == "°" else f"{text}\u00a0{unit}"
 
 
 def _exponent(size: float) -> int:
@@ -86,7 +86,7 @@ def number(value: float, digits: int = 3) -> str:
 
 def percent(fraction: float) -> str:
     """A fraction as a percentage with two digits: `0.34 %`."""
-    return f"{number(100 * fraction, 2)} %"
+    return f"{number(100 * fraction, 2)}\u00a0%"
 
 
 _UNITS = {
@@ -131,4 +131,4 @@ def bare(text: str) -> str:
     out = []
     for style, part in rich(text):
         out.append(("^" if style == "sup" else "_" if style == "sub" else "") + part)
-    return "".join(out)
+    return "".join(out).replace("\u00a0", " ")

@@ -59,6 +59,7 @@ def _content(report: Report, root: Path) -> dict[str, Any]:
         if isinstance(item, Figure):
             return picture(item)
         if isinstance(item, Table):
+            item = item.steady
             return {
                 "kind": "table",
                 "number": numbers[item.key],

@@ -1,0 +1,83 @@
+"""The languages say the same things: same keys, same blanks to fill in, letters that the shipped fonts have."""
+
+from __future__ import annotations
+
+import string
+from datetime import date
+from importlib.resources import files
+
+import pytest
+
+from toolkit.errors import UsageError
+from toolkit.report.words import languages, load_words
+
+
+def blanks(text: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(text) if name}
+
+
+def test_english_and_thai_are_there():
+    assert {"en", "th"} <= set(languages())
+    with pytest.raises(UsageError, match="unknown language 'xx'"):
+        load_words("xx")
+
+
+@pytest.mark.parametrize("lang", languages())
+def test_keys_and_blanks_agree(lang):
+    english, other = load_words("en").table, load_words(lang).table
+    assert set(other) == set(english)
+    for key, text in english.items():
+        assert blanks(other[key]) == blanks(text), key
+        assert other[key].strip(), key
+
+
+@pytest.mark.parametrize("lang", languages())
+def test_no_word_switches_mathtext_on(lang):
+    """matplotlib sets Thai wrongly in a string with $…$."""
+    assert not [key for key, text in load_words(lang).table.items() if "$" in text]
+
+
+def test_thai_is_thai():
+    """No sentence was left in English: names of models, captions, findings and remedies hold Thai letters."""
+    same = {
+        "column.reduced_chi2",
+        "column.delta_aic",
+        "column.delta_bic",
+        "column.cpu",
+        "figure.theta_deg",
+        "figure.omega",
+    }
+    for key, text in load_words("th").table.items():
+        section = key.split(".")[0]
+        if (
+            section in ("language", "symbol", "reference")
+            or key in same
+            or key in ("date.year_offset", "text.known_g", "meaning.omega_g")
+        ):
+            continue
+        assert any("\u0e00" <= c <= "\u0e7f" for c in text), key
+
+
+def test_dates():
+    day = date(2026, 11, 22)
+    assert load_words("en").date(day) == "22 November 2026"
+    assert load_words("th").date(day) == "22 พฤศจิกายน พ.ศ. 2569"
+
+
+@pytest.mark.parametrize("lang", languages())
+def test_figures_have_every_glyph(lang):
+    """The words drawn by matplotlib are covered by the shipped Thai font and matplotlib's own DejaVu Sans."""
+    from matplotlib import font_manager
+    from matplotlib.ft2font import FT2Font
+
+    paths = [font_manager.findfont("DejaVu Sans")]
+    paths += [str(f) for f in (files("toolkit.report") / "fonts").iterdir() if f.name.endswith(".ttf")]
+    known = set().union(*(FT2Font(path).get_charmap() for path in paths))
+    for key, text in load_words(lang).table.items():
+        if key.split(".")[0] in ("figure", "symbol"):
+            assert {ord(c) for c in text} <= known, key
+
+
+def test_the_font_s_licence_is_shipped():
+    text = (files("toolkit.report") / "fonts" / "OFL.txt").read_text(encoding="utf-8")
+    assert "SIL OPEN FONT LICENSE" in text.upper()
