@@ -41,7 +41,7 @@ class Outcome:
     refused: str = ""
     visible_frames: int = 0
     ok_fraction: float = 0.0
-    hidden_ok: int = 0  # frames marked ok though less than 70 % of the bob is visible
+    hidden_ok: int = 0  # frames marked ok though less than half of the bob is visible
     rms_x_px: float = float("nan")
     rms_y_px: float = float("nan")
     spread_x_px: float = float("nan")
@@ -101,7 +101,7 @@ def measure(scene: Scene, video: Path, name: str = "") -> Outcome:
         name=name,
         visible_frames=int(seen.sum()),
         ok_fraction=float(ok[seen].mean()) if seen.any() else 0.0,
-        hidden_ok=int((ok & (truth.visible[row] < 0.7)).sum()),
+        hidden_ok=int((ok & (truth.visible[row] < 0.5)).sum()),
         rms_x_px=float(np.sqrt(np.mean(dx[ok] ** 2))),
         rms_y_px=float(np.sqrt(np.mean(dy[ok] ** 2))),
         spread_x_px=float(np.std(dx[ok])),
