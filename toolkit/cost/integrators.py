@@ -272,7 +272,8 @@ def _slope(scene: Scene) -> Callable[[float, Any], tuple[float, float]]:
 
 def _coefficients(scene: Scene) -> tuple[float, float, float, float, float]:
     exact = _exact_coefficients(scene)
-    return (*(float(v) for v in exact[:4]), 2 * math.pi * float(exact[4]))
+    two_alpha, beta, gravity, drive, f_hz = (float(v) for v in exact)
+    return two_alpha, beta, gravity, drive, 2 * math.pi * f_hz
 
 
 def _exact_coefficients(scene: Scene) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
@@ -385,7 +386,7 @@ def _true_linear(scene: Scene, t_s: np.ndarray) -> np.ndarray:
 
 def _true_slack(scene: Scene, t_s: np.ndarray) -> np.ndarray:
     """One slack episode from the bottom without drag: elliptic functions and a parabola in mpmath at 40 digits."""
-    import mpmath as mp  # type: ignore[import-untyped]
+    import mpmath as mp
 
     with mp.workdps(40):
         length, g = mp.mpf(scene.pendulum.length_m or 1.0), mp.mpf(scene.environment.gravity_m_per_s2)
