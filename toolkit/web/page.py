@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nicegui import app, events, run, ui
+from nicegui import app, events, ui
 
 from toolkit.analyse import SERIES_SUFFIXES, VIDEO_SUFFIXES, is_video
 from toolkit.errors import PendulabError
@@ -93,7 +93,7 @@ def _content(visit: _Visit, lang: str) -> None:
         frame_place.clear()
         try:
             if is_video(path):
-                picture, size = await run.io_bound(_first_frame, path)
+                picture, size = await asyncio.to_thread(_first_frame, path)
                 with frame_place:
                     _frame(visit, words, picture, size)
         except PendulabError as error:
@@ -170,19 +170,18 @@ def _frame(visit: _Visit, words: dict[str, str], picture: str, size: tuple[int, 
 async def _analyse(
     visit: _Visit, scene: Scene, lang: str, fps_factor: float, result: Any, words: dict[str, str]
 ) -> None:
-    assert visit.recording is not None
+    recording = visit.recording
+    assert recording is not None
     out = visit.folder / f"report-{uuid.uuid4().hex}"
     measuring: dict[str, Any] = {}
-    if is_video(visit.recording):
+    if is_video(recording):
         measuring = {"fps_factor": fps_factor, **{name: visit.clicks.get(name) for name in ("bob", "pivot")}}
 
     def progress(stage: str, fraction: float) -> None:
         visit.stage = (stage, fraction)
 
-    analysis, _ = await run.io_bound(
-        lambda: make_report(
-            visit.recording, out, scene, lang=lang, overlay=visit.recording is not None, progress=progress, **measuring
-        )
+    analysis, _ = await asyncio.to_thread(
+        lambda: make_report(recording, out, scene, lang=lang, overlay=True, progress=progress, **measuring)
     )
     archive = await asyncio.to_thread(shutil.make_archive, str(out), "zip", out)
     address = f"/results/{out.name}"
@@ -192,8 +191,7 @@ async def _analyse(
 
     result.clear()
     with result:
-        for line in summary_lines(analysis, lang):
-            ui.label(line)
+        ui.label("\n".join(summary_lines(analysis, lang))).classes("whitespace-pre-line")
         ui.link(words["open"], f"{address}/report.html", new_tab=True).mark("report")
         ui.link(words["all"], zip_address).mark("zip")
 

@@ -1,0 +1,74 @@
+"""The page is served to this computer only, and makes the same report as the command."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("nicegui", reason="the web page is an extra: pip install 'pendulab[web]'")
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def test_the_page_is_served_and_asks_no_other_host():
+    port = free_port()
+    code = f"from toolkit.web import serve; serve({port}, show=False)"
+    server = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        page = b""
+        for _ in range(120):
+            try:
+                page = urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=10).read()
+                break
+            except OSError:
+                assert server.poll() is None, "the server ended"
+                time.sleep(0.5)
+        assert b"From a video of a pendulum to a report" in page
+        assert b'src="http' not in page
+        assert b'href="http' not in page
+    finally:
+        server.terminate()
+        server.wait(20)
+
+
+def test_a_port_in_use_or_impossible():
+    from toolkit import JobError, UsageError
+    from toolkit.web import serve
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(JobError, match="--port"):
+            serve(taken.getsockname()[1], show=False)
+    with pytest.raises(UsageError, match="70000"):
+        serve(70000, show=False)
+
+
+def test_the_first_frame_is_shown_in_its_own_pixels():
+    from toolkit.web.page import _first_frame
+
+    address, size = asyncio.run(asyncio.to_thread(_first_frame, ROOT / "data" / "samples" / "pendulum.mp4"))
+    assert size == (640, 480)
+    assert address.startswith("data:image/jpeg;base64,")
+
+
+def test_both_languages_have_the_same_words():
+    from toolkit.web.page import _WORDS
+
+    assert set(_WORDS["en"]) == set(_WORDS["th"])
