@@ -27,9 +27,8 @@ def free_port() -> int:
 def test_the_page_is_served_and_asks_no_other_host():
     port = free_port()
     code = f"from toolkit.web import serve; serve({port}, show=False)"
-    server = subprocess.Popen(
-        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+    outside = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    server = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=outside, stderr=subprocess.DEVNULL)
     try:
         page = b""
         for _ in range(120):
