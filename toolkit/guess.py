@@ -59,10 +59,14 @@ def guess(
     start = min(start, 3.1) if not small_angle else start
     turns = _unwrapped(time, omega, phase)
     run = _run(time, ratio, 1.0 if small_angle else float(frequency_ratio(np.array([start]))[0]))
+    phase_zero = float(turns[0] - omega_g * run[0])
     if time.size > 2:
-        omega_g, phase_zero = (float(v) for v in np.polyfit(run, turns, 1, w=amplitude))
-    else:
-        phase_zero = float(turns[0] - omega_g * run[0])
+        slope, level = (float(v) for v in np.polyfit(run, turns, 1, w=amplitude))
+        if np.max(np.abs(turns - level - slope * run)) < 1.0:  # otherwise a turn was lost in a gap
+            omega_g, phase_zero = slope, level
+        else:
+            omega_g = float(np.median(omega / ratio))
+            phase_zero = float(turns[0] - omega_g * run[0])
     turn = phase_zero + math.pi / 2
     phi = turn if small_angle else _amplitude_phase(turn, start)
     return Guess(

@@ -43,6 +43,7 @@ _DRAG_NAMES = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
 _NOT_GUESSED = ("theta_offset", "angle_scale", "time_scale", "f0", "f", "drive_phase")
 _LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 _BAD = 1e10
+_SEEN = 40.0
 
 
 @dataclass(frozen=True)
@@ -125,10 +126,15 @@ class Problem:
         return Motion(base.theta, base.omega, d_theta, d_omega, base.method)
 
     def _refuse_runaway(self, reduced: Mapping[str, float], stop_s: float) -> None:
-        """Negative drag that would multiply the swing costs an integrator dearly and is never the answer."""
+        """What costs an integrator dearly and is never the answer: negative drag that multiplies the swing, swings faster
+        than the points can show, drag that stops everything between two points."""
         omega, peak = reduced["omega_g"], abs(reduced["theta0"])
-        if not (omega > 0 and math.isfinite(peak)):
+        fastest = math.pi * max(len(self.series) - 1, 1) / max(stop_s - float(self.t_s[0]), 1e-12)
+        if not (0 < omega < 4 * fastest and math.isfinite(peak)):
             raise ArithmeticError("no such pendulum")
+        stiff = reduced.get("alpha_d", 0.0) + reduced.get("beta", 0.0) * omega * min(peak, 3.0)
+        if not (stiff < 4 * fastest and stiff * stop_s < 2e4 and reduced.get("mu", 0.0) < 100 * omega**2):
+            raise ArithmeticError("no such drag")
         rate = (
             min(reduced.get("alpha_d", 0.0), 0.0)
             + 4 / (3 * math.pi) * min(reduced.get("beta", 0.0), 0.0) * omega * peak
@@ -232,13 +238,20 @@ class Problem:
         given = {name: value for name, value in start.items() if name in self.free}
         guessed = [name for name in self.free if name not in _NOT_GUESSED]
         whole = all(name in given for name in guessed)
-        if whole:
+        near = whole and self._follows({**self.values, **given})
+        if near:
             yield {**self.values, **given}
         begin = {**self.values, **self._from_guess(self._guess())}
-        if given and not whole:
+        if given and not whole and self._follows({**begin, **given}):
             yield {**begin, **given}
         yield begin
         yield from self._grown()
+
+    def _follows(self, values: Mapping[str, float]) -> bool:
+        """Whether a start already explains half of the record's spread; one that does not is worth less than the guess."""
+        residual, _ = self._residuals(values, (), self.series.theta_rad, np.ones(len(self.series)))
+        measured = residual[: len(self.series)]
+        return bool(np.mean(measured**2) < 0.5 * np.var(self.series.theta_rad))
 
     def _guess(self) -> Guess:
         drive = self._drive()
@@ -328,6 +341,9 @@ class Problem:
         residual = self.series.theta_rad - found.seen
         noise = max(point_noise(self.series.theta_rad), 1e-12)
         rms = float(np.sqrt(np.mean(residual**2)))
+        spread = float(np.var(self.series.theta_rad))
+        if residual.size * (spread - rms**2) < _SEEN * rms**2:  # no more than a sine takes from noise
+            return False
         return rms < 5 * noise or rms < 0.3 * float(np.std(self.series.theta_rad))
 
     def _descend(self, begin: Mapping[str, float], free: tuple[str, ...]) -> Solved | None:
