@@ -105,6 +105,9 @@ def facts(material: Material) -> tuple[Fact, ...]:
             remark = words("answer.given_length") if given else words("answer.equivalent", g=number(g, 6))
             found.append(Fact(words("question.length"), with_uncertainty(length.value, length.stderr, "m"), remark))
             break
+    gravity = parameter(material.full_sine, "g_from_length")
+    if gravity is not None:
+        found.append(Fact(words("question.g"), f"g = {with_uncertainty(gravity.value, gravity.stderr, 'm/s²')}"))
     return tuple(found)
 
 
@@ -168,7 +171,7 @@ def _short_answer(material: Material, finding: Finding) -> str:
         if finding.verdict == "holds" and widest:
             return words("answer.yes_to", angle=number(math.degrees(widest), 2))
     widest = float(np.max(np.abs(material.theta - material.offset)))
-    if finding.verdict == "fails" and where.get("amplitude_below_rad", 0.0) >= widest:
+    if finding.verdict == "fails" and where.get("amplitude_below_rad", 0.0) >= 0.9 * widest:
         return words("answer.throughout")
     if finding.verdict == "fails" and "amplitude_above_rad" in where:
         return words("answer.above", angle=number(math.degrees(where["amplitude_above_rad"]), 2))
@@ -304,10 +307,23 @@ def _equation(material: Material) -> Section:
     words, best = material.words, material.best
     blocks: list[Block] = [Paragraph(words("text.equation", model=model_name(words, best.model)))]
     if best.equation_latex:
-        blocks.append(Equation(best.equation_latex, formula("equation", best.equation_latex)))
+        latex = _collected(best.equation_latex)
+        blocks.append(Equation(latex, formula("equation", latex)))
     blocks.append(_parameter_table(words, best))
     blocks.append(Paragraph(f"{words('text.conventions')} {words('text.start')}"))
     return Section("equation", words("section.equation"), tuple(blocks))
+
+
+def _collected(latex: str) -> str:
+    """The equation with its lengths collected: ℓ ℓ as ℓ²."""
+    for old, new in (
+        (r"\left(m {\ell}^{2}\right)", r"m \ell^{2}"),
+        (r"\left|\dot\theta\right|", r"|\dot\theta|"),
+        (r"\ell |\dot\theta| \ell \ell", r"\ell^{3} |\dot\theta|"),
+        (r"\ell \ell", r"\ell^{2}"),
+    ):
+        latex = latex.replace(old, new)
+    return latex
 
 
 def _parameter_table(words: Words, result: FitResult) -> Table:

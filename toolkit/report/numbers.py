@@ -57,7 +57,7 @@ def with_uncertainty(value: float, u: float | None, unit: str = "", digits: int 
 def _joined(text: str, unit: str) -> str:
     if not unit:
         return text
-    return text + unit if unit == "°" else f"{text}\u00a0{unit}"
+    return text + unit if unit == "°" and not text.endswith("}") else f"{text}\u00a0{unit}"
 
 
 def _exponent(size: float) -> int:

@@ -29,7 +29,7 @@ def decay(material: Material, width_in: float = 3.35, height_in: float = 2.5) ->
 
     def paint(figure: Any) -> None:
         top, rest = panels(figure, 2, sharex=True, height_ratios=(2, 1)) if laws else (panels(figure), None)
-        dots(top, cycles.t_s, degrees, DATA, 2.2, 1.0, words("figure.measured"))
+        dots(top, cycles.t_s, degrees, DATA, 2.2 if degrees.size > 60 else 4.0, 1.0, words("figure.measured"))
         for name, (law, colour, dash) in laws.items():
             top.plot(cycles.t_s, np.degrees(law), dash, color=colour, label=words(f"figure.law_{name}"))
         top.set_ylabel(words("figure.amplitude_deg"))

@@ -28,7 +28,11 @@ def period(material: Material, width_in: float = 3.35, height_in: float = 2.5) -
         axis = panels(figure)
         degrees = np.degrees(cycles.amplitude_rad)
         many = degrees.size > 60
-        dots(axis, degrees, cycles.period_s, DATA, 2.2, 0.5 if many else 1.0, words("figure.one_swing"))
+        if many:
+            dots(axis, degrees, cycles.period_s, DATA, 2.2, 0.5, words("figure.one_swing"))
+        else:
+            bars = {"fmt": "o", "color": INK, "markersize": 3.2, "elinewidth": 0.8, "zorder": 4}
+            axis.errorbar(degrees, cycles.period_s, cycles.sigma_period_s, label=words("figure.one_swing"), **bars)
         if many:
             at, mean, error = binned(degrees, cycles.period_s, 16)
             axis.errorbar(
