@@ -57,7 +57,7 @@ def write_overlay(
             scratch,
             *size,
             rate,
-            {"name": "h264", "crf": 23, "preset": "superfast"},
+            {"name": "h264", "crf": 23},
             even=out_path.suffix.lower() == ".avi",
         ) as film,
     ):

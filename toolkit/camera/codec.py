@@ -22,6 +22,7 @@ EFFECT = CameraEffect(
         Parameter("name", "", "which codec", "h264", choices=("h264", "hevc", "mjpeg", "lossless")),
         Parameter("bit_rate_bit_per_s", "bit/s", "mean bit rate; 0 for constant quality", 0.0, 0.0, 1e9),
         Parameter("crf", "1", "constant quality of H.264 and HEVC: 0 best, 51 worst", 18.0, 0.0, 51.0),
+        Parameter("effort", "", "how hard H.264 and HEVC try", "quick", choices=("quick", "thorough")),
         Parameter("keyframe_interval", "frame", "largest distance of key frames", 60.0, 1.0, 10000.0),
     ),
     apply=apply,

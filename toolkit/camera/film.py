@@ -11,6 +11,12 @@ import numpy as np
 from toolkit.errors import JobError, UsageError
 
 _ENCODERS = {"h264": "libx264", "hevc": "libx265", "mjpeg": "mjpeg"}
+_PRESETS = {
+    ("h264", "quick"): "superfast",
+    ("h264", "thorough"): "medium",
+    ("hevc", "quick"): "ultrafast",
+    ("hevc", "thorough"): "fast",
+}
 _SUFFIXES = (".mp4", ".mov", ".mkv", ".avi")
 _CLOCK = 90_000  # ticks a second of films whose frames are not evenly spaced
 
@@ -99,7 +105,7 @@ def _encoder(codec: dict[str, Any], suffix: str) -> tuple[str, dict[str, str], s
         return "ffv1", {"coder": "0", "context": "0"}, "yuv444p"
     if name == "mjpeg":
         return "mjpeg", {} if rated else {"qmin": "2", "qmax": "3"}, "yuvj420p"
-    options = {"g": interval, "preset": codec.get("preset", "superfast" if name == "h264" else "ultrafast")}
+    options = {"g": interval, "preset": _PRESETS[name, codec.get("effort", "quick")]}
     if name == "h264":
         options["x264-params"] = "mbtree=0"  # with it, small pictures are not encoded the same way twice
     if name == "hevc":
