@@ -311,7 +311,7 @@ def _peer_with_slack(name: str, problem: Problem, tolerance: float) -> tuple[np.
         return y[2], y[3], 0.0, -g
 
     def stretched(t: float, y: Any) -> float:
-        return y[0] ** 2 + y[1] ** 2 - length**2 * (1 + 1e-9)
+        return y[0] ** 2 + y[1] ** 2 - length**2 * (1 + 1e-12)
 
     tension.terminal, tension.direction = True, -1.0  # type: ignore[attr-defined]
     stretched.terminal, stretched.direction = True, 1.0  # type: ignore[attr-defined]
