@@ -162,7 +162,7 @@ def measure_integrators(quick: bool = False, progress: Progress = silent) -> Mea
                 run = _timed(problem.name, name, setting, solve, judged, truth, name in OURS, quick)
                 if run is not None:
                     runs.append(run)
-                if run is not None and run.cpu_ms > (500 if quick else 10_000):
+                if run is not None and run.cpu_ms > (500 if quick else 2_000):
                     break  # tighter settings of this method would cost more than they tell
     progress("first calls in fresh processes, compiling", len(chosen) / (len(chosen) + 1))
     return Measured(chosen, tuple(runs), first_calls(("P1", "L") if quick else ("P1", "P2", "L")))
