@@ -90,7 +90,7 @@ def facts(material: Material) -> tuple[Fact, ...]:
     for name in MAIN:
         finding = _finding(material, name)
         if finding is not None:
-            found.append(Fact(words(f"question.{name}"), _short_answer(material, finding), ""))
+            found.append(Fact(words(f"question.{name}"), _short_answer(material, finding), _theory(words, finding)))
     period = parameter(material.full_sine, "T0")
     if period is not None:
         shown = with_uncertainty(period.value, period.stderr, "s")
@@ -178,6 +178,14 @@ def _short_answer(material: Material, finding: Finding) -> str:
     if finding.verdict == "fails" and "amplitude_below_rad" in where:
         return words("answer.below", angle=number(math.degrees(where["amplitude_below_rad"]), 2))
     return words("answer.yes" if finding.verdict == "holds" else "answer.no")
+
+
+def _theory(words: Words, finding: Finding) -> str:
+    """What theory alone says of the small-angle period at this swing's width; "" for other assumptions."""
+    shift, widest = finding.evidence.get("period_shift_relative"), finding.evidence.get("amplitude_max_rad")
+    if finding.assumption != "small_angle" or shift is None or widest is None:
+        return ""
+    return words("answer.theory", percent=percent(shift), angle=number(math.degrees(widest), 3))
 
 
 def verdicts(material: Material) -> tuple[Verdict, ...]:
@@ -487,7 +495,7 @@ def _findings(material: Material) -> Section | None:
         card = _card(words, finding, None)
         text = f"{card.sentence} {card.remedy[:1].upper()}{card.remedy[1:]}".strip()
         rows.append((card.title, card.label, text))
-    header = tuple(words(f"column.{c}") for c in ("parameter", "verdict", "finding"))
+    header = tuple(words(f"column.{c}") for c in ("check", "verdict", "finding"))
     return Section(
         "findings", words("section.findings"), (Table("checks", words("caption.checks"), header, tuple(rows)),)
     )

@@ -124,7 +124,7 @@ def _width_percent(figure: Figure) -> float:
 def _columns(table: Table) -> list[str]:
     """`auto` for short columns, `wide` for those whose cells are long; at least one takes the rest of the line."""
     longest = [max(len(bare(row[k])) for row in (table.header, *table.rows)) for k in range(len(table.header))]
-    kinds = ["auto" if width <= 22 else "wide" for width in longest]
+    kinds = ["auto" if width <= 28 else "wide" for width in longest]
     if "wide" not in kinds:
         kinds[longest.index(max(longest))] = "wide"
     return kinds

@@ -38,12 +38,14 @@ def motion(material: Material) -> Figure | None:
     tension = np.cos(best.theta_rad - material.offset) + (best.omega_rad_per_s / material.omega_g) ** 2
     long = [np.degrees(material.theta), best.omega_rad_per_s, weight * tension]
 
+    size = 2.2 if points.sum() > 200 else 4.0
+
     def paint(figure: Any) -> None:
         axes = panels(figure, 3, 2 if whole else 1, squeeze=False, sharex="col")
         for row, (measured, label, scale) in enumerate(seen):
             axis = axes[row, -1]
             if measured is not None:
-                dots(axis, t[points], measured[points], DATA, 2.2, 1.0, words("figure.measured"))
+                dots(axis, t[points], measured[points], DATA, size, 1.0, words("figure.measured"))
             middle, band = _of(near, row)
             axis.plot(near.t_s, scale(middle), color=BEST_MODEL, label=words("figure.model"))
             if band is not None:
@@ -73,7 +75,12 @@ def motion(material: Material) -> Figure | None:
         "omega_model_rad_per_s": best.omega_rad_per_s,
     }
     data["tension_over_weight"] = tension
-    return Figure("motion", words("caption.motion"), draw("motion", words.lang, 4.5, paint), data)
+    return Figure(
+        "motion",
+        words("caption.motion" if whole else "caption.motion_short"),
+        draw("motion", words.lang, 4.5, paint),
+        data,
+    )
 
 
 def _of(curve: Curve, row: int) -> tuple[np.ndarray, np.ndarray | None]:

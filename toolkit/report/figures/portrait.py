@@ -26,7 +26,7 @@ def portrait(material: Material) -> Figure | None:
             np.degrees(material.theta[shown]),
             material.measured_omega[shown],
             DATA,
-            1.6,
+            1.6 if shown.size > 400 else 3.2,
             1.0,
             words("figure.measured"),
         )

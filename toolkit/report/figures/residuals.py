@@ -33,7 +33,7 @@ def residuals(material: Material) -> Figure | None:
         for line, (result, colour, name) in zip(axes, rows):
             rest = 1e3 * result.residuals_rad
             for axis, (x, _) in zip(line, against):
-                dots(axis, x[shown], rest[shown], DATA, 1.2, 0.7)
+                dots(axis, x[shown], rest[shown], DATA, 1.2 if shown.size > 400 else 2.8, 0.7)
                 at, mean, error = binned(x, rest)
                 if at.size:
                     axis.errorbar(at, mean, error, color=colour, linewidth=1.1, elinewidth=0.7)
