@@ -117,7 +117,8 @@ def _mean_period(material: Material, small_s: float) -> str:
 
     if material.cycles is None:
         return ""
-    amplitude = float(np.median(material.cycles.amplitude_rad))
+    scale = 1 + (value(material.full_sine, "angle_scale") or 0.0)
+    amplitude = float(np.median(material.cycles.amplitude_rad)) / scale
     longer = float(period_of(np.array([amplitude]), small_s)[0])
     values = {
         "angle": number(math.degrees(amplitude), 3),

@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.cycles import Cycles, amplitude_of
 from toolkit.report.document import Figure
-from toolkit.report.material import Material
+from toolkit.report.material import Material, value
 from toolkit.report.style import BEST_MODEL, DATA, PAPER_MODEL, dots, draw, panels
 
 _LAWS = (("full_linear_drag", "linear", PAPER_MODEL, "-"), ("full_quadratic_drag", "quadratic", BEST_MODEL, "--"))
@@ -36,7 +36,7 @@ def decay(material: Material, width_in: float = 3.35, height_in: float = 2.5) ->
         if degrees.max() > 1.6 * degrees.min():
             top.set_yscale("log")
             _plain_log(top)
-        top.legend()
+        top.legend(loc="upper right")
         if rest is None:
             top.set_xlabel(words("figure.time_s"))
             return
@@ -57,7 +57,8 @@ def _envelope(material: Material, model: str, cycles: Cycles) -> np.ndarray | No
     result = material.analysis.fits.get(model)
     if result is None or not result.success or len(result.theta_rad) != material.t.size:
         return None
-    return np.interp(cycles.t_s, material.t, amplitude_of(result))
+    scale = 1 + (value(result, "angle_scale") or 0.0)  # as the camera sees it
+    return scale * np.interp(cycles.t_s, material.t, amplitude_of(result))
 
 
 def _plain_log(axis: Any) -> None:

@@ -20,13 +20,14 @@ def period(material: Material, width_in: float = 3.35, height_in: float = 2.5) -
         return None
     words = material.words
     threshold = threshold_rad(material)
-    widest = float(cycles.amplitude_rad.max()) * 1.05
+    amplitude = cycles.amplitude_rad / (1 + (value(material.full_sine, "angle_scale") or 0.0))  # as the fit corrects it
+    widest = float(amplitude.max()) * 1.05
     grid = np.linspace(0, min(widest, 3.1), 200)
     theory = period_of(grid, small)
 
     def paint(figure: Any) -> None:
         axis = panels(figure)
-        degrees = np.degrees(cycles.amplitude_rad)
+        degrees = np.degrees(amplitude)
         many = degrees.size > 60
         if many:
             dots(axis, degrees, cycles.period_s, DATA, 2.2, 0.5, words("figure.one_swing"))
@@ -51,7 +52,7 @@ def period(material: Material, width_in: float = 3.35, height_in: float = 2.5) -
         axis.ticklabel_format(axis="y", useOffset=False)
         axis.legend(loc="upper left")
 
-    data = {"amplitude_rad": cycles.amplitude_rad, "period_s": cycles.period_s}
+    data = {"amplitude_rad": amplitude, "period_s": cycles.period_s}
     data["sigma_period_s"] = cycles.sigma_period_s
     return Figure("period", words("caption.period"), draw("period", words.lang, height_in, paint, width_in), data)
 
