@@ -105,3 +105,9 @@ def test_files(tmp_path):
     assert set(rows[0]) == {"claim", "statement", "regime", "phi", "model", "verdict", "deciding_numbers"}
     assert "0.060 rad" in text
     assert text.count("steady") == 14
+
+
+def test_both_models_come_to_the_same_verdicts(judgements):
+    for (claim, regime, phi, model), judgement in judgements.items():
+        if model == "small angle":
+            assert judgement.verdict == judgements[claim, regime, phi, "full equation"].verdict

@@ -477,7 +477,7 @@ class Equation:
         address, compile_s = self._jet
         began = time.process_time()
         span = float(task.tau[-1]) - task.start
-        tolerance = max(0.3 * accuracy / (1.0 + 0.3 * span), _FLOOR)
+        tolerance = max(0.1 * accuracy / (1.0 + 0.3 * span), _FLOOR)
         evaluations = steps = 0
         for _attempt in range(6):
             order = min(max(int(1.5 - 0.7 * math.log(tolerance)), 6), taylor.MAX_ORDER)

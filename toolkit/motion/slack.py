@@ -79,18 +79,16 @@ def solve_with_slack(
         fastest = max(natural, fastest_rad_per_s, abs(rate) + 2 * natural)
         window = min(end, now + 200 / fastest)
         until, at_theta, at_omega = _swing_until_slack(now, angle, rate, window, fastest, swing, tension)
-        went_slack = at_theta is not None
-        stop = int(np.searchsorted(t, until, side="left" if went_slack else "right"))
+        stop = int(np.searchsorted(t, until, side="right" if at_theta is None else "left"))
         if stop > done:
             theta[done:stop], omega[done:stop] = swing(now, angle, rate, t[done:stop])
             done = stop
-        if not went_slack:
+        if at_theta is None or at_omega is None:
             if done >= t.size:
                 break
             last = swing(now, angle, rate, np.array([until]))
             now, angle, rate = until, float(last[0][0]), float(last[1][0])
             continue
-        assert at_theta is not None and at_omega is not None
         events.append(Event("slack", until, at_theta))
         flight = _fly(until, at_theta, at_omega, length_m, g_m_per_s2, acceleration, end)
         stop = int(np.searchsorted(t, flight.stop, side="left"))
