@@ -28,12 +28,16 @@ _CLICK_SIGMA_PX = 1.0
 
 @dataclass(frozen=True)
 class PivotEstimate:
-    """A pivot (x, y) in px with its (2, 2) covariance, how it was found, and the goodness of that fit."""
+    """A pivot (x, y) in px with its (2, 2) covariance, how it was found, and the goodness of that fit.
+
+    slant (2, 2) turns what was seen at a slant, about the pivot, into the plane of swing; None for a square view.
+    """
 
     xy: np.ndarray
     covariance: np.ndarray
     method: str
     reduced_chi2: float = 1.0
+    slant: np.ndarray | None = None
 
     @property
     def sigma_px(self) -> tuple[float, float]:
@@ -53,6 +57,9 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     warnings = list(track.meta.get("warnings", []))
     pivot = _pivot(track, x, y, sx, sy, kept, log, warnings)
     px, py = pivot.xy
+    if pivot.slant is not None:
+        x, y = pivot.xy[:, None] + pivot.slant @ np.array([x - px, y - py])
+        sx, sy = sx * pivot.slant[0, 0], sy * pivot.slant[1, 1]
     direction = np.unwrap(np.arctan2(x - px, y - py))
     distance = np.hypot(x - px, y - py)
     length = float(np.median(distance))
@@ -65,6 +72,7 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
         "pivot_px": [float(px), float(py)],
         "pivot_sigma_px": list(pivot.sigma_px),
         "pivot_method": pivot.method,
+        "slant": None if pivot.slant is None else pivot.slant.tolist(),
         "radius_px": float(track.radius_px),
         "radius_sigma_px": float(track.meta.get("radius_sigma_px", 0.1)),
         "vertical_rad": vertical,
@@ -208,13 +216,38 @@ def _pivot(
     xy = arc.xy - gain @ difference
     covariance = arc.covariance - gain @ arc.covariance
     if chi2 > 11.8:  # 3σ for two numbers
-        warnings.append(
+        said = (
             f"the pivot by the arc and by the string differ by {np.hypot(*difference):.1f} px ({np.sqrt(chi2):.0f}σ): "
-            "the camera was tilted, its lens distorts, or the bob swung out of the plane; angles may be scaled by about "
-            f"{abs(difference[1]) / np.hypot(*(np.mean([x, y], axis=1) - xy)):.1%}"
+            "the camera was tilted, its lens distorts, or the bob swung out of the plane"
         )
-        covariance = covariance * chi2 / 2
+        slant = _slant(x - lines.xy[0], y - lines.xy[1])
+        if slant is None:
+            away = np.hypot(*(np.mean([x, y], axis=1) - xy))
+            warnings.append(f"{said}; angles may be wrong by about {np.hypot(*difference) / away:.1%}")
+            return PivotEstimate(xy, covariance * chi2 / 2, "the arc and the string's lines together", chi2)
+        # seen at a slant a circle is an ellipse; the string's lines still meet in its centre
+        small, large = np.linalg.eigvalsh(slant)
+        tilt = float(np.degrees(np.arccos(small / large)))
+        warnings.append(
+            f"{said}; read as a view at a slant of {tilt:.0f}°, which was taken out; for it angles are uncertain by "
+            f"{(large / small - 1) / 3:.1%}"
+        )
+        reach = (large / small - 1) / 3 * float(np.median(np.hypot(x - lines.xy[0], y - lines.xy[1])))
+        spread = lines.covariance + np.diag([0.0, reach**2])
+        return PivotEstimate(lines.xy, spread, "the string's lines, the arc seen at a slant", chi2, slant)
     return PivotEstimate(xy, covariance, "the arc and the string's lines together")
+
+
+def _slant(dx: np.ndarray, dy: np.ndarray) -> np.ndarray | None:
+    """The symmetric (2, 2) matrix that turns the ellipse about (0, 0) through the points into a circle of about the same
+    size; None where the points lie on no such ellipse or it is very flat."""
+    size = float(np.median(np.hypot(dx, dy)))
+    u, v = dx / size, dy / size
+    a, b, c = np.linalg.lstsq(np.column_stack([u * u, u * v, v * v]), np.ones(u.size), rcond=None)[0]
+    values, vectors = np.linalg.eigh(np.array([[a, b / 2], [b / 2, c]]))
+    if values[0] <= 0 or not 1.03 < values[1] / values[0] < 4:  # less than 10° a bent lens does as well
+        return None
+    return np.asarray(vectors @ np.diag(np.sqrt(values)) @ vectors.T)
 
 
 def _string_pivot(track: Track, kept: np.ndarray) -> PivotEstimate | None:

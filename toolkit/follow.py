@@ -18,6 +18,7 @@ from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, P
 from toolkit.video import Frame
 
 _STRING_EVERY = 3
+_CHECK_EVERY = 12
 
 
 @dataclass
@@ -29,7 +30,7 @@ class Record:
     place: list[Place] = field(default_factory=list)
     ok: list[bool] = field(default_factory=list)
     repeated: list[bool] = field(default_factory=list)
-    shift: list[CameraShift] = field(default_factory=list)
+    shift: list[CameraShift | None] = field(default_factory=list)
     string: dict[int, tuple[float, ...]] = field(default_factory=dict)
 
 
@@ -79,6 +80,7 @@ class Follower:
                 cv2.line(moving, (round(x), round(y)), (round(far[0]), round(far[1])), 1, 44)
         self.anchors = Anchors(batch[0].luma, moving > 0)
         self.shaking = False
+        self.checks: dict[int, CameraShift] = {}
         self._shifts: dict[int, CameraShift] = {}
         points = dict(rough.points)
         if len(self.anchors) == 0:
@@ -139,12 +141,22 @@ class Follower:
             return None if patch is None else fit_disc(patch, look, guess, **how)  # type: ignore[arg-type]
 
         exposure = 0.0
+        xs_middle = float(np.median([p[0] for p in points.values()]))
         for _ in range(2):  # the streak widens the edge, the edge shortens the streak
             slow = np.argsort(speed)[: max(8, numbers.size // 4)][:16]
-            fits = [f for f in (fit(k, look, exposure, calibrate=True, turns=8) for k in slow) if f is not None]
+            found = [fit(k, look, exposure, calibrate=True, turns=8) for k in slow]
+            fits = [f for f in found if f is not None]
             if len(fits) >= 3:
                 middle = np.median(np.array(fits), axis=0)
                 look = Look(radius or middle[2], max(0.35, middle[3]), middle[9], middle[7])
+                left = np.array([points[numbers[k]][0] < xs_middle for k, f in zip(slow, found) if f is not None])
+                sizes = np.array([f[2] for f in fits])
+                if not radius and 3 <= left.sum() <= left.size - 3:
+                    spread = np.hypot(
+                        sizes[left].std() / np.sqrt(left.sum()), sizes[~left].std() / np.sqrt((~left).sum())
+                    )
+                    change = abs(sizes[left].mean() - sizes[~left].mean())
+                    look = look._replace(radius_free=bool(change > max(0.05, 4 * spread)))
             if speed.max() * self.interval_s < 1.0:
                 break
             fast = np.argsort(-speed)[:6]
@@ -152,8 +164,8 @@ class Follower:
             cost = np.zeros(trials.size)
             for j, part in enumerate(trials):
                 for k in fast:
-                    found = fit(k, look, part * self.interval_s, turns=6)
-                    cost[j] += np.inf if found is None else found[7] ** 2
+                    trial = fit(k, look, part * self.interval_s, turns=6)
+                    cost[j] += np.inf if trial is None else trial[7] ** 2
             if not np.isfinite(cost).any():
                 break
             j = int(np.argmin(cost))
@@ -195,15 +207,25 @@ class Follower:
     # --- geometry -------------------------------------------------------------------------------------------------
 
     def _camera(self, frame: Frame) -> CameraShift:
-        """The camera's shift in this frame; a still camera is only looked at now and then."""
-        if not self.shaking:
-            return STILL
+        """The camera's shift in this frame. One that seems to stand still is only looked at now and then."""
         known = self._shifts.get(frame.index)
-        if known is None:
-            last = self.record.shift[-1] if self.record.shift else STILL
-            known = self.anchors.shift(frame.luma) or last
-            self._shifts[frame.index] = known
-        return known
+        if known is not None:
+            return known if self.shaking else STILL
+        check = not self.shaking and frame.index % _CHECK_EVERY == 0
+        if len(self.anchors) < 2 or not (self.shaking or check):
+            return STILL
+        found = self.anchors.shift(frame.luma)
+        if self.shaking:
+            last = self.record.shift[-1] if self.record.shift else None
+            found = found or last or STILL
+        if found is not None:
+            self._shifts[frame.index] = found
+            if check:
+                self.checks[len(self.record.index)] = found
+                if np.hypot(found.x_px, found.y_px) > max(0.4, 6 * found.sigma_px):
+                    self.shaking = True
+                    return found
+        return found if self.shaking and found is not None else STILL
 
     def _guess(self, x: float, y: float, bx: float, by: float) -> Guess:
         px, py = self.pivot or self.swing.pivot_px
@@ -230,18 +252,18 @@ class Follower:
 
     def follow(self, frame: Frame) -> None:
         """Measure one frame, in the order of the file."""
+        shift = self._camera(frame)
         x, y, vx, vy = self._expect(frame.t_s)
         guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
         patch = self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)
         ok = self._believe(place, x, y)
         r = self.record
-        shift = self._camera(frame)
         r.index.append(frame.index)
         r.t_s.append(frame.t_s)
         r.place.append(place)
         r.ok.append(ok)
-        r.shift.append(shift)
+        r.shift.append(shift if self.shaking else None)
         r.repeated.append(self._is_repeat(frame))
         if ok and patch is not None:
             self.hidden = 0

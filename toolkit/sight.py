@@ -15,7 +15,7 @@ LUMA = (1.0, 0.0, 0.0)
 class Sight:
     """A weighted sum of luma and the two colour differences (each less 128), plus 128 where colour is in it.
 
-    Half-size colour planes lie as H.264 and HEVC have them: on even columns, between the rows.
+    Half-size colour planes are taken to lie in the middle of the pixels that they stand for.
     """
 
     weights: tuple[float, float, float] = LUMA
@@ -48,11 +48,11 @@ def _enlarged(plane: np.ndarray, shape: tuple[int, ...], x0: int, y0: int, x1: i
     fy, fx = round(shape[0] / plane.shape[0]), round(shape[1] / plane.shape[1])
     if fx == 1 and fy == 1:
         return plane[y0:y1, x0:x1].astype(np.float32)
-    sy = 0.5 / fy if fy > 1 else 0.0  # rows lie midway, columns on the even ones
+    sx, sy = 0.5 * (fx - 1) / fx, 0.5 * (fy - 1) / fy
     u0, v0 = max(0, x0 // fx - 2), max(0, y0 // fy - 2)
     u1, v1 = min(plane.shape[1], x1 // fx + 3), min(plane.shape[0], y1 // fy + 3)
     part = plane[v0:v1, u0:u1].astype(np.float32)
-    back = np.array([[1 / fx, 0, x0 / fx - u0], [0, 1 / fy, y0 / fy - sy - v0]])
+    back = np.array([[1 / fx, 0, x0 / fx - sx - u0], [0, 1 / fy, y0 / fy - sy - v0]])
     how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return cv2.warpAffine(part, back, (x1 - x0, y1 - y0), flags=how, borderMode=cv2.BORDER_REPLICATE)
 

@@ -15,6 +15,7 @@ from toolkit.errors import JobError, UsageError
 from toolkit.follow import Follower, Record
 from toolkit.output import whole_file
 from toolkit.progress import Progress, silent
+from toolkit.stillness import CameraShift
 from toolkit.swing import Swing, fit_swing
 from toolkit.trackers import load_tracker
 from toolkit.video import Frame, Video, clock_warnings, open_video
@@ -197,11 +198,17 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         raise JobError(f"the bob was seen on only {good.sum()} of {good.size} frames of {video.path}; {REMEDY}")
     start = follower.swing
     start = Swing(start.values, start.covariance, start.t0_s - r.t_s[0], start.rms_px)
-    shift = _Shift(r, follower.shaking, good, log)
+    shift = _Shift(follower, good, log)
     x, y = x + shift.raw_x - shift.x, y + shift.raw_y - shift.y
     swing = _whole_swing(start, t, x, y, good, video.path)
     _require_pendulum(swing, t, x, y, good, video.path)
     mx, my = swing.position(t)
+    slips = _clock_slips(t, x - mx, y - my, swing, good)
+    if slips.size:
+        warnings.append(
+            f"the clock of the file slips by whole frames at {slips.size} place(s), first at t = {t[slips[0]]:.3f} s (a "
+            "camera that lost or repeated frames and did not say so); the error bars allow for it"
+        )
     good = good & ~_out_of_time(r, t, x - mx, y - my, swing, good, warnings)
     for a in (x, y, sx, sy):
         a[~good] = np.nan
@@ -271,27 +278,37 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
 
 
 class _Shift:
-    """How far the camera's shake moved the bob's place on each frame, smoothed as far as its own noise asks for."""
+    """How far the camera's shake moved the bob's place on each frame, smoothed as far as its own noise asks for.
 
-    def __init__(self, r: Record, shaking: bool, good: np.ndarray, log: list[str]) -> None:
+    raw_x, raw_y (n,) were taken away while following (0 where the camera seemed to stand still), x, y (n,) are to be.
+    """
+
+    def __init__(self, follower: Follower, good: np.ndarray, log: list[str]) -> None:
+        r = follower.record
         n = len(r.index)
-        self.raw_x, self.raw_y = np.zeros(n), np.zeros(n)
-        self.sigma = np.zeros(n)
+        self.raw_x, self.raw_y, self.sigma = np.zeros(n), np.zeros(n), np.zeros(n)
         self.x, self.y = self.raw_x, self.raw_y
-        if not shaking:
+        known: dict[int, CameraShift] = {**follower.checks, **{k: s for k, s in enumerate(r.shift) if s is not None}}
+        if not follower.shaking or not known:
             return
-        for k, (s, p) in enumerate(zip(r.shift, r.place)):
-            ok = good[k]
-            self.raw_x[k], self.raw_y[k] = s.at(p.x_px if ok else s.centre_x_px, p.y_px if ok else s.centre_y_px)
-        shifts = np.array([(s.x_px, s.y_px) for s in r.shift])
-        smooth, sigma = _smoothed(shifts)
-        self.x = self.raw_x + (smooth - shifts)[:, 0]
-        self.y = self.raw_y + (smooth - shifts)[:, 1]
-        self.sigma = np.full(n, sigma)
+        at = np.array(sorted(known))
+        rows = np.array([known[k][:3] for k in at])
+        shifts = np.column_stack([np.interp(np.arange(n), at, column) for column in rows.T])
+        first = next(k for k in range(n) if r.shift[k] is not None)
+        smooth = shifts.copy()
+        smooth[first:], noise = _smoothed(shifts[first:])
+        one = next(iter(known.values()))
+        self.x, self.y = np.zeros(n), np.zeros(n)
+        for k, p in enumerate(r.place):
+            where = (p.x_px, p.y_px) if good[k] else (one.centre_x_px, one.centre_y_px)
+            self.x[k], self.y[k] = one._replace(x_px=smooth[k, 0], y_px=smooth[k, 1], roll_rad=smooth[k, 2]).at(*where)
+            if k >= first:
+                self.raw_x[k], self.raw_y[k] = r.shift[k].at(*where)  # type: ignore[union-attr]
+        self.sigma = np.full(n, noise)
         extent = np.ptp(shifts, axis=0)
         log.append(
             f"The camera moved by up to {extent[0]:.1f} px across and {extent[1]:.1f} px down; this was measured on the "
-            f"still background (to {sigma:.3f} px a frame) and taken away."
+            f"still background (to {noise:.3f} px a frame) and taken away."
         )
 
 
@@ -353,10 +370,9 @@ def _out_of_time(
     across = (ry * vx - rx * vy) / speed
     near = _running_median(along, good)
     noise = 1.4826 * float(np.median(np.abs((along - near)[good]))) + 1e-3
-    step = np.gradient(t) * speed
-    leap = (
-        good & (np.abs(along - near) > np.maximum(8 * noise, 0.35 * step)) & (np.abs(across) < 4 * noise + 0.5 * step)
-    )
+    step = float(np.median(np.diff(t))) * speed
+    leap = good & (step > max(6 * noise, 0.3 * float(step.max())))
+    leap &= (np.abs(along - near) > np.maximum(8 * noise, 0.5 * step)) & (np.abs(across) < 4 * noise + 0.5 * step)
     repeats = np.array(r.repeated) & (step > 4 * noise) & good
     if repeats.any():
         first = t[np.flatnonzero(repeats)[0]]
@@ -371,6 +387,39 @@ def _out_of_time(
             f"frames), first at t = {first:.3f} s; they were left out"
         )
     return leap | repeats
+
+
+def _clock_slips(t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, good: np.ndarray) -> np.ndarray:
+    """The frames from which on the motion is early or late by whole frames for good.
+
+    Each place is judged by lines through the seven measured frames before and after it, where the bob is fast.
+    """
+    vx, vy = swing.velocity(t)
+    speed = np.hypot(vx, vy) + 1e-9
+    step = float(np.median(np.diff(t)))
+    ahead = (rx * vx + ry * vy) / speed**2 / step  # in frames
+    slips: list[int] = []
+    chosen = np.flatnonzero(good & (speed > 0.25 * speed.max()))
+    n = 7
+    if chosen.size < 4 * n:
+        return np.array(slips, int)
+    leap, off = np.zeros(chosen.size), np.full(chosen.size, np.inf)
+    for i in range(n, chosen.size - n):
+        a, b = chosen[i - n : i], chosen[i : i + n]
+        if b[-1] - a[0] > 3 * n:
+            continue
+        middle = 0.5 * (a[-1] + b[0])
+        before, after = (np.polyfit(p - middle, ahead[p], 1) for p in (a, b))
+        rest = np.concatenate([ahead[p] - np.polyval(f, p - middle) for p, f in ((a, before), (b, after))])
+        leap[i], off[i] = after[1] - before[1], np.sqrt(np.mean(rest**2))
+    while True:
+        i = int(np.argmax(np.where(off < 0.12, np.abs(leap), 0)))
+        whole = round(float(leap[i]))
+        if whole == 0 or off[i] >= 0.12 or abs(leap[i] - whole) > 0.3:
+            break
+        slips.append(int(chosen[i]))
+        leap[max(0, i - n) : i + n] = 0
+    return np.array(sorted(slips), int)
 
 
 def _running_median(values: np.ndarray, good: np.ndarray, half: int = 7) -> np.ndarray:

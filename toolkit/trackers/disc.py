@@ -24,7 +24,7 @@ def compiled() -> Any:
     """The compiled fit (compiled at the first call ever, then from the disk).
 
     fit(image, back, seen, start (cx, cy, R, s), streak (bx, by), string_rad, string_half_rad, noise, contrast, free,
-    turns, out) with free 6 (centre, shading, gain) or 8 (and R, s). Writes out = cx, cy, R, s, var_x, var_y, cov_xy,
+    turns, out) with free 6 (centre, shading, gain), 7 (and R) or 8 (and s). Writes out = cx, cy, R, s, var_x, var_y, cov_xy,
     misfit, visible, contrast, gain, pixels, wall; returns False where it did not settle: singular normal equations,
     the centre left the patch, or the steps did not become small.
     """
@@ -268,11 +268,13 @@ def compiled() -> Any:
             still = size < 0.03
             if free > 6:
                 radius += min(max(damp * step[6], -0.2 * radius), 0.2 * radius)
+                still = still and abs(step[6]) < 0.02
+            if free > 7:
                 soft = min(max(soft + damp * step[7], 0.8), 1.2 * radius)
-                still = still and abs(step[6]) < 0.02 and abs(step[7]) < 0.05
+                still = still and abs(step[7]) < 0.05
             if not (0.0 <= cx <= columns - 1.0 and 0.0 <= cy <= rows - 1.0):
                 return False
-            if turn + 1 == turns and not still and free == 6 and not (damp == 1.0 and size < 0.3):
+            if turn + 1 == turns and not still and free < 8 and not (damp == 1.0 and size < 0.3):
                 return False
             last = still and turn > 1
         for which in range(2):  # covariance of the centre: solve for the first two unit vectors
@@ -322,7 +324,7 @@ def fit_disc(
         half,
         look.noise,
         look.contrast if soften == 1.0 else 0.0,
-        8 if calibrate else 6,
+        8 if calibrate else 7 if look.radius_free and soften == 1.0 else 6,
         turns,
         out,
     )

@@ -29,6 +29,7 @@ class Look(NamedTuple):
 
     radius_px, edge_px : radius and standard deviation of its edge.    contrast : bob minus wall, in grey levels.
     noise : typical misfit of a good fit, in grey levels.    template : (k, k) float32 mean picture, or None.
+    radius_free : the bob's size changes along its way (perspective, focus): it is to be fitted on every frame.
     """
 
     radius_px: float
@@ -36,6 +37,7 @@ class Look(NamedTuple):
     contrast: float = 0.0
     noise: float = np.inf
     template: np.ndarray | None = None
+    radius_free: bool = False
 
 
 class Guess(NamedTuple):
