@@ -298,9 +298,10 @@ def test_any_bytes_give_a_series_or_one_line(tmp_path_factory, content, name):
     path = tmp_path_factory.mktemp("any") / name
     path.write_bytes(content)
     try:
-        assert isinstance(read_series(path), ThetaSeries)
+        result = read_series(path)
     except PendulabError as error:
-        assert "\n" not in str(error).replace(str(content), "")
+        result = str(error)
+    assert isinstance(result, ThetaSeries) or "\n" not in result
 
 
 # -- Tracker ----------------------------------------------------------------------------------------------------------
@@ -371,7 +372,7 @@ def test_a_cut_project_is_one_line(tmp_path):
     whole = (tmp_path / "a.trk").read_bytes()
     for part in (10, 200, len(whole) // 2, len(whole) - 5):
         (tmp_path / "cut.trk").write_bytes(whole[:part])
-        with pytest.raises(JobError, match="cut.trk"):
+        with pytest.raises(JobError, match=r"cut\.trk"):
             read_series(tmp_path / "cut.trk")
 
 

@@ -112,20 +112,13 @@ def facts(material: Material) -> tuple[Fact, ...]:
 
 
 def _mean_period(material: Material, small_s: float) -> str:
-    """The period at the middle of the amplitudes seen, which is what a stopwatch would give."""
-    from toolkit.cycles import period_of
-
+    """What a stopwatch would give: the median of the measured periods, with the amplitude it belongs to."""
     if material.cycles is None:
         return ""
-    scale = 1 + (value(material.full_sine, "angle_scale") or 0.0)
-    amplitude = float(np.median(material.cycles.amplitude_rad)) / scale
-    longer = float(period_of(np.array([amplitude]), small_s)[0])
-    values = {
-        "angle": number(math.degrees(amplitude), 3),
-        "period": number(longer, 6),
-        "percent": percent(longer / small_s - 1),
-    }
-    return material.words("answer.mean_period", **values)
+    angle = math.degrees(float(np.median(material.cycles.amplitude_rad)))
+    longer = float(np.median(material.cycles.period_s))
+    share = percent(longer / small_s - 1)
+    return material.words("answer.mean_period", angle=number(angle, 3), period=number(longer, 5), percent=share)
 
 
 def _drag_answer(material: Material, result: FitResult) -> str:

@@ -76,8 +76,7 @@ def _xml_of(path: Path) -> bytes:
     if not zipfile.is_zipfile(path):
         if path.suffix.lower() == ".trz":
             raise JobError(f"{path} is not a zip archive as a .trz must be; save the project again in Tracker")
-        data = path.read_bytes()
-        return data
+        return path.read_bytes()
     return member_of_zip(path, (".trk",), _MAX_XML_BYTES)
 
 
