@@ -1,4 +1,35 @@
-"""diagnose: which assumptions of the experiment hold, which fail, where, and what the record cannot tell."""
+"""diagnose: which assumptions of the experiment hold, which fail, where, and what the record cannot tell.
+
+Every finding names its sentence by `words_key`; `words_values` hold the numbers in it (SI, shares as fractions):
+
+    small_angle.fails                   amplitude_above_rad t_start_s t_stop_s amplitude_max_rad period_shift difference_rad sigmas
+    small_angle.holds                   amplitude_max_rad period_shift amplitude_visible_rad difference_rad
+    small_angle.not_distinguishable     the same, delta_chi2 omega_g_bias_sigma
+    small_angle.no_fit
+    linear_drag.fails                   amplitude_above_rad share amplitude_max_rad visible_share sigmas [t_start_s t_stop_s]
+    linear_drag.fails.friction          amplitude_below_rad share amplitude_min_rad visible_share sigmas [t_start_s t_stop_s]
+    linear_drag.holds                   share_bound delta_chi2 amplitude_max_rad amplitude_min_rad
+    linear_drag.not_distinguishable.little_decay, .noise
+                                        delta_chi2 delta_chi2_quadratic_alone decay
+    linear_drag.no_fit
+    white_residuals.holds               rho1
+    white_residuals.fails               rho1 inflation frequency_hz strongest_over_swing
+    white_residuals.too_few             points
+    clock.holds
+    clock.repeated                      frames t_start_s
+    clock.jump                          t_start_s jump_s
+    clock.rate                          t_start_s rate_change
+    clock.not_distinguishable           t_start_s share
+    geometry.holds, .scale, .pivots, .or_clock, .not_distinguishable
+                                        scale scale_u pivots_sigma
+    frictionless_pivot.holds            share_bound
+    frictionless_pivot.fails            share share_at_end sigmas
+    frictionless_pivot.not_distinguishable   share_bound delta_chi2
+    no_drive.holds, .fails, .slow, .not_distinguishable
+                                        frequency_hz amplitude_rad over_swing
+    taut_string.holds                   tension_over_weight amplitude_max_rad
+    taut_string.fails                   the same, t_start_s t_stop_s amplitude_above_rad slack_share
+"""
 
 from __future__ import annotations
 

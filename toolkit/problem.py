@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,6 +65,7 @@ class Problem:
     loss: str = "linear"
     time_sigma_s: float = 0.0
     shift_s: float = 0.0
+    _last: dict[Any, Any] = field(init=False, default_factory=dict, repr=False, compare=False)
 
     @property
     def t_s(self) -> np.ndarray:
@@ -112,7 +113,7 @@ class Problem:
         times = self.t_s if t_s is None else t_s
         reduced, by = self.reduce(values)
         self._refuse_runaway(reduced, float(times[-1]))
-        needed = [c for c in dict.fromkeys(c for name in names for c in by.get(name, {}))]
+        needed = list(dict.fromkeys(c for name in names for c in by.get(name, {})))
         stretched = times * (1 + values.get("time_scale", 0.0))
         base = self.model.motion(reduced, stretched, needed)
         d_theta, d_omega = np.zeros((2, times.size, len(names)))
@@ -144,7 +145,19 @@ class Problem:
             raise ArithmeticError("negative drag makes the motion run away")
 
     def predict(self, values: Mapping[str, float], names: Sequence[str]) -> tuple[np.ndarray, np.ndarray, Motion]:
-        """What the camera should see, (n,), its derivatives (n, k) by `names`, and the motion itself."""
+        """What the camera should see, (n,), its derivatives (n, k) by `names`, and the motion itself.
+
+        The last answer is kept: a minimiser asks for the residuals and the Jacobian of one point in turn.
+        """
+        point = (tuple(values.items()), tuple(names))
+        if self._last.get("point") != point:
+            self._last.clear()
+            self._last["answer"] = self._predicted(values, names)
+            self._last["point"] = point
+        seen, by, motion = self._last["answer"]
+        return seen.copy(), by.copy(), motion
+
+    def _predicted(self, values: Mapping[str, float], names: Sequence[str]) -> tuple[np.ndarray, np.ndarray, Motion]:
         motion = self.motion(values, None, names)
         scale = 1 + values.get("angle_scale", 0.0)
         seen = scale * motion.theta + values.get("theta_offset", 0.0)
@@ -375,7 +388,7 @@ class Problem:
             try:
                 if self.loss == "linear":
                     outcome = minimizer.minimize(
-                        method="leastsq", Dfun=lambda p: evaluate(p)[1], ftol=1e-10, xtol=1e-10, factor=1.0
+                        method="leastsq", Dfun=lambda p: evaluate(p)[1], ftol=1e-9, xtol=1e-9, factor=1.0
                     )
                 else:
                     sizes = np.linalg.norm(evaluate(parameters)[1], axis=0)
@@ -388,7 +401,7 @@ class Problem:
                     )
             except (ValueError, TypeError, FloatingPointError, np.linalg.LinAlgError, ArithmeticError):
                 return None
-            values = {**held, **{name: float(outcome.params[name].value) for name in free}}
+            values = {**held, **dict(zip(free, (float(outcome.params[name].value) for name in free)))}
             residual, _ = self._residuals(values, free, measured, weight)
         if not np.all(np.isfinite(residual)) or residual[0] >= _BAD:
             return None
@@ -655,11 +668,12 @@ def pose(
 def _tidied(values: Mapping[str, float], small_angle: bool) -> dict[str, float]:
     """θ₀ ≥ 0 (and ≤ π with the full sine) and −π < φ ≤ π: the same motion."""
     tidy = dict(values)
-    if not small_angle:  # only sin(θ₀/2) counts
+    if not small_angle and not abs(tidy["theta0"]) <= math.pi:  # only sin(θ₀/2) counts
         tidy["theta0"] = 2 * math.asin(math.sin(tidy["theta0"] / 2))
     if tidy["theta0"] < 0:
         tidy["theta0"], tidy["phi"] = -tidy["theta0"], tidy["phi"] + math.pi
-    tidy["phi"] = math.remainder(tidy["phi"], 2 * math.pi)
+    if abs(tidy["phi"]) > math.pi:
+        tidy["phi"] = math.remainder(tidy["phi"], 2 * math.pi)
     return tidy
 
 
