@@ -531,6 +531,8 @@ class Equation:
             if error <= accuracy:
                 break
             tolerance *= 0.3 * accuracy / error
+        else:
+            return None
         cost = SolveCost(time.process_time() - began, compile_s, 7 * steps, steps)
         return _Result(error, "Rodas4, L-stable", cost, 0)
 
