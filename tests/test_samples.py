@@ -72,3 +72,12 @@ def test_the_series_is_its_simulation_with_its_noise():
 
 def test_samples_stay_small():
     assert sum(path.stat().st_size for path in SAMPLES.iterdir() if path.is_file()) < 4_000_000
+
+
+def test_the_measured_series_is_within_a_hundredth_of_a_degree_of_the_truth():
+    series = read_series(SAMPLES / "pendulum.theta.csv")
+    truth = pd.read_csv(SAMPLES / "pendulum.truth.csv")
+    error = series.theta_rad - np.interp(series.t_s, truth.t_s, truth.theta_rad)
+    assert len(series) > 0.98 * len(truth)
+    assert np.degrees(np.sqrt(np.mean(error**2))) < 0.01
+    assert 0.8 < np.std(error / series.sigma_theta_rad) < 1.3
