@@ -16,13 +16,13 @@ from scipy.integrate import solve_ivp
 
 def acceleration(p: Mapping[str, float], small_angle: bool = False) -> Any:
     """(t, θ, ω, sign of ω) -> θ'' for the effects whose parameters are in `p`."""
-    m, l, g = p.get("mass_kg", 1.0), p["length_m"], p["g_m_per_s2"]
+    m, length, g = p.get("mass_kg", 1.0), p["length_m"], p["g_m_per_s2"]
     k, c = p.get("linear_drag.k_d_kg_per_s", 0.0), p.get("quadratic_drag.c_kg_per_m", 0.0)
     torque = p.get("pivot_friction.torque_n_m", 0.0)
     f0, f, phase = (p.get(f"cosine_drive.{n}", 0.0) for n in ("f0_n", "f_hz", "phase_rad"))
     a, fp = p.get("moving_pivot.amplitude_m", 0.0), p.get("moving_pivot.f_hz", 0.0)
     factor = p.get("sphere_drag.factor", 0.0)
-    sphere_re = 2 * p.get("bob_radius_m", 0.0) * l * p.get("fluid_density_kg_per_m3", 0.0)
+    sphere_re = 2 * p.get("bob_radius_m", 0.0) * length * p.get("fluid_density_kg_per_m3", 0.0)
     sphere_re /= p.get("fluid_viscosity_pa_s", 1.0)
     area = 0.5 * p.get("fluid_density_kg_per_m3", 0.0) * math.pi * p.get("bob_radius_m", 0.0) ** 2
 
@@ -30,14 +30,14 @@ def acceleration(p: Mapping[str, float], small_angle: bool = False) -> Any:
         pull = theta if small_angle else math.sin(theta)
         tilt = 1.0 if small_angle else math.cos(theta)
         rate = 2 * math.pi * fp
-        v = l * omega - a * rate * math.sin(rate * t) * tilt  # pivot shaken to the right
-        total = -g / l * pull - k * v / (m * l) - c * l / m * omega * omega * sign
-        total += f0 * math.cos(2 * math.pi * f * t + phase) / (m * l) - torque * sign / (m * l * l)
-        total += a * rate**2 * math.cos(rate * t) * tilt / l
+        v = length * omega - a * rate * math.sin(rate * t) * tilt  # pivot shaken to the right
+        total = -g / length * pull - k * v / (m * length) - c * length / m * omega * omega * sign
+        total += f0 * math.cos(2 * math.pi * f * t + phase) / (m * length) - torque * sign / (m * length * length)
+        total += a * rate**2 * math.cos(rate * t) * tilt / length
         if factor and omega:
             re = sphere_re * abs(omega)
             c_d = 24 / re * (1 + 0.152 * re**0.677) + 0.417 / (1 + 5070 * re**-0.94)
-            total -= factor * area * c_d * (l * omega) ** 2 * sign / (m * l)
+            total -= factor * area * c_d * (length * omega) ** 2 * sign / (m * length)
         return total
 
     return second

@@ -58,7 +58,8 @@ def load(name: str) -> ModuleType | None:
     if not path.exists():
         return None
     spec = importlib.util.spec_from_file_location(f"pendulab_{name}", path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # Numba's cache looks it up by name
     try:
@@ -75,10 +76,9 @@ def jet_address(module: ModuleType) -> int:
 
     pointer = types.CPointer(types.float64)
     signature = types.void(pointer, pointer, pointer, pointer, types.int64)
-    module.compiled_jet = numba.cfunc(
-        signature, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"}
-    )(module.jet)  # type: ignore[attr-defined]
-    address: int = module.compiled_jet.address
+    made = numba.cfunc(signature, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})(module.jet)
+    module.__dict__["compiled_jet"] = made  # the machine code lives as long as the module
+    address: int = made.address
     return address
 
 
@@ -89,6 +89,7 @@ def terms_address(module: ModuleType) -> int:
 
     pointer = types.CPointer(types.float64)
     signature = types.void(pointer, pointer, pointer)
-    module.compiled_terms = numba.cfunc(signature, cache=True, error_model="numpy")(module.terms)  # type: ignore[attr-defined]
-    address: int = module.compiled_terms.address
+    made = numba.cfunc(signature, cache=True, error_model="numpy")(module.terms)
+    module.__dict__["compiled_terms"] = made
+    address: int = made.address
     return address

@@ -313,9 +313,10 @@ class Equation:
         """Where the rows of the coefficient matrix lie for these sensitivities; made once."""
         known = self._memory.get(sensitivities)
         if known is not None:
-            return known  # type: ignore[no-any-return]
+            return known
         code = self.code
-        rows, take, start = [list(row) for row in code.ROWS], [], [0]
+        rows, start = [list(row) for row in code.ROWS], [0]
+        take: list[int] = []
         offsets = np.concatenate([[0], np.cumsum([len(row) for row in code.PARTIAL_ROWS])])
         for name in sensitivities:
             if name in START:
@@ -337,7 +338,7 @@ class Equation:
         self._memory[sensitivities] = made
         return made
 
-    def _reduced(self, p: tuple[float, ...]) -> tuple[complex, ...]:
+    def _reduced(self, p: Sequence[complex]) -> tuple[complex, ...]:
         """(restoring, damping, drive, f, phase) of  θ'' = −restoring·sin θ − damping·θ' + drive·cos(2πft + phase).
 
         Only for effects declared linear; p may be complex (for derivatives).
@@ -397,7 +398,7 @@ class Equation:
             elif name in self.parameters:
                 step = 1e-30  # complex step: the derivative to the last digit
                 moved = [v + 1j * step if n == name else v for n, v in zip(self.parameters, p)]
-                k, d, a, f, ph = (complex(v).imag / step for v in self._reduced(tuple(moved)))
+                k, d, a, f, ph = (complex(v).imag / step for v in self._reduced(moved))
                 by_turn = 2 * math.pi * f
                 chain[2:, column] = d / 2, k / (2 * rate), a, by_turn, ph + by_turn * start_s
             elif name not in SCENE_SYMBOLS:

@@ -432,7 +432,7 @@ def _name(symbol: Any) -> str:
 def _python(expression: Any) -> str:
     from sympy.printing.pycode import PythonCodePrinter
 
-    class Printer(PythonCodePrinter):  # type: ignore[misc]
+    class Printer(PythonCodePrinter):
         def _print_Symbol(self, symbol: Any) -> str:
             return _name(symbol)
 

@@ -7,6 +7,7 @@ computed from cannot differ.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 from toolkit.effects.effect import Effect, PivotMotion
@@ -33,6 +34,9 @@ class Symbols:
 
     def __init__(self, names: Mapping[str, Any]):
         self.__dict__.update(names)
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"no symbol {name!r}; an effect names what it uses in `needs` or `parameters`")
 
     def of(self, own: Mapping[str, Any]) -> Symbols:
         """The same symbols with an effect's own parameters."""
@@ -107,6 +111,10 @@ class Latex:
         """A number or LaTeX as LaTeX."""
         if isinstance(value, Latex):
             return value
+        part = Fraction(value).limit_denominator(12)
+        if part.denominator > 1 and abs(part - value) < 1e-15 and part.denominator not in (2, 4, 5, 8, 10):
+            sign = "-" if part < 0 else ""
+            return Latex(rf"{sign}\frac{{{abs(part.numerator)}}}{{{part.denominator}}}", _UNARY if sign else _ATOM)
         number = f"{value:g}"
         if "e" in number:
             digits, exponent = number.split("e")
@@ -162,6 +170,9 @@ class Latex:
                 if other.level == _PRODUCT
                 else Latex(rf"{self.at(_PRODUCT)} \left({other.text}\right)", _PRODUCT)
             )
+        if self.level == _ATOM and (other.text == self.text or other.text.startswith(self.text + " ")):
+            squared = Latex(rf"{{{self.text}}}^{{2}}", _POWER)
+            return squared if other.text == self.text else squared * Latex(other.text[len(self.text) + 1 :], _PRODUCT)
         dot = r" \cdot " if other.text[0].isdigit() else r" "
         return Latex(self.at(_PRODUCT) + dot + other.at(_PRODUCT), _PRODUCT)
 
