@@ -158,7 +158,7 @@ def _expected_frames(video: Video, start_s: float | None, stop_s: float | None) 
         length = float(video.metadata.get("duration_s", "nan"))
     except ValueError:
         length = float("nan")
-    stop = min(x for x in (stop_s, length, 1e9) if x is not None and x == x)  # noqa: PLR0124
+    stop = min(x for x in (stop_s, length, 1e9) if x is not None and x == x)
     return max(1, int((stop - (start_s or 0.0)) * (video.fps_header or 30.0))) if stop < 1e9 else 1000
 
 
@@ -227,7 +227,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         f"The bob was followed by its {follower.sight.name} with the {follower.localiser.name} localiser (radius "
         f"{look.radius_px:.2f} px, edge {look.edge_px:.2f} px, exposure {follower.exposure_s / fps_factor * 1e3:.1f} ms): "
         f"{good.sum()} of {good.size} frames measured, {bridged.sum()} bridged by the fitted motion.",
-        f"The error bars of the fit were multiplied by {scale[0]:.2f} (x) and {scale[1]:.2f} (y), "  # noqa: ISC004
+        f"The error bars of the fit were multiplied by {scale[0]:.2f} (x) and {scale[1]:.2f} (y), "
         "the scatter seen about a smooth motion.",
     ]
     strings = np.full((t.size, 5), np.nan)

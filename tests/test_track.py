@@ -1,0 +1,213 @@
+"""Tracking of small clips drawn here, where the truth is known."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from toolkit.calibrate import arc_pivot, calibrate, line_pivot, write_calibration_json
+from toolkit.errors import JobError, UsageError
+from toolkit.swing import NAMES, fit_circle, fit_swing
+from toolkit.track import OK, PREDICTED, track, write_track_csv
+
+av = pytest.importorskip("av")
+cv2 = pytest.importorskip("cv2")
+
+W, H, FPS, PIVOT, LENGTH, RADIUS, OMEGA = 320, 240, 60.0, (160.0, -40.0), 230.0, 11.0, 5.0
+
+
+def angles(t, amplitude=0.3):
+    """A lightly damped small swing, good enough as a pendulum for amplitudes of 0.3."""
+    from scipy.integrate import solve_ivp
+
+    def motion(_, y):
+        return [y[1], -(OMEGA**2) * np.sin(y[0]) - 0.04 * y[1]]
+
+    return solve_ivp(motion, (0, t[-1] + 1), [amplitude, 0.0], t_eval=t, rtol=1e-9, atol=1e-10).y[0]
+
+
+def draw(x, y, rng, pivot=PIVOT, string=True, post=None):
+    """One frame: wall, string, bob as an exact anti-aliased disc, then noise."""
+    big = np.full((H, W), 190.0)
+    if string:
+        cv2.line(
+            big, tuple(round(16 * v) for v in (x, y)), tuple(round(16 * v) for v in pivot), 110.0, 1, cv2.LINE_AA, 4
+        )
+    rows, columns = np.mgrid[0:H, 0:W]
+    share = np.clip(RADIUS + 0.5 - np.hypot(columns - x, rows - y), 0, 1)
+    big = big * (1 - share) + 60.0 * share
+    if post:
+        big[:, post[0] : post[1]] = 120.0
+    return np.clip(big + rng.normal(0, 1.5, big.shape), 0, 255).astype(np.uint8)
+
+
+def film(path, frames, fps=FPS):
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator())
+        stream.width, stream.height, stream.pix_fmt = W, H, "yuv420p"
+        stream.options = {"crf": "10", "preset": "veryfast"}
+        for picture in frames:
+            container.mux(
+                stream.encode(av.VideoFrame.from_ndarray(np.repeat(picture[..., None], 3, 2), format="rgb24"))
+            )
+        container.mux(stream.encode())
+    return path
+
+
+def swing_clip(path, seconds=3.0, amplitude=0.3, **how):
+    rng = np.random.default_rng(0)
+    t = np.arange(round(seconds * FPS)) / FPS
+    theta = angles(t, amplitude)
+    x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
+    film(path, (draw(a, b, rng, **how) for a, b in zip(x, y)))
+    return t, theta, x, y
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    path = tmp_path_factory.mktemp("plain") / "plain.mp4"
+    return path, swing_clip(path)
+
+
+def test_plain_clip_with_no_click(plain):
+    path, (t, theta, x, y) = plain
+    found = track(path)
+    assert found.ok.all()
+    assert np.allclose(found.t_s, t, atol=1e-4)
+    errors = np.concatenate([found.x_px - x, found.y_px - y])
+    assert np.sqrt(np.mean(errors**2)) < 0.05
+    pulls = errors / np.concatenate([found.sigma_x_px, found.sigma_y_px])
+    assert 0.8 < np.std(pulls) < 1.25
+    assert found.radius_px == pytest.approx(RADIUS, abs=0.3)
+    series = calibrate(found)
+    assert np.hypot(*(np.array(series.meta["calibration"]["pivot_px"]) - PIVOT)) < 1.0
+    assert np.degrees(np.sqrt(np.mean((series.theta_rad - theta) ** 2))) < 0.02
+    assert series.meta["calibration"]["pivot_px"][1] < 0  # above the picture
+
+
+def test_files(plain, tmp_path):
+    import csv
+    import json
+
+    found = track(plain[0], bob=(plain[1][2][0], plain[1][3][0]))
+    write_track_csv(found, tmp_path / "track.csv")
+    with open(tmp_path / "track.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[:7] == ["frame", "t_s", "x_px", "y_px", "sigma_x_px", "sigma_y_px", "status"]
+    assert len(rows) == found.frame.size
+    assert float(rows[7]["x_px"]) == pytest.approx(found.x_px[7], abs=1e-4)
+    write_calibration_json(calibrate(found), tmp_path / "calibration.json")
+    content = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
+    assert {"pivot_px", "pivot_sigma_px", "radius_px", "radius_sigma_px", "vertical_rad", "fps"} <= set(content)
+
+
+def test_a_post_hides_the_bob_for_a_while(tmp_path):
+    _, _, x, _ = swing_clip(tmp_path / "post.mp4", seconds=4.0, post=(150, 175))
+    found = track(tmp_path / "post.mp4")
+    hidden = (x > 152) & (x < 172)
+    clear = (x < 150 - RADIUS - 2) | (x > 175 + RADIUS + 2)
+    assert (found.status[hidden] != OK).all()
+    assert (found.status[hidden] == PREDICTED).mean() > 0.9
+    assert (found.status[clear] == OK).mean() > 0.85
+    assert np.abs((found.x_px - x)[found.status == OK]).max() < 0.6
+    assert np.nanmax(np.abs((found.x_px - x)[found.status == PREDICTED])) < 1.0
+
+
+@pytest.mark.parametrize("kind", ["still", "noise", "passing", "short", "one"])
+def test_what_is_no_pendulum_is_refused(tmp_path, kind):
+    rng = np.random.default_rng(3)
+    path = tmp_path / "no.mp4"
+    n = {"short": 14, "one": 1}.get(kind, 90)
+    if kind == "noise":
+        frames = [np.clip(rng.normal(128, 20, (H, W)), 0, 255).astype(np.uint8) for _ in range(n)]
+    elif kind == "passing":
+        frames = [draw(20 + 3 * i, 120.0, rng, string=False) for i in range(n)]
+    elif kind == "short":
+        theta = angles(np.arange(n) / FPS)
+        frames = [draw(PIVOT[0] + LENGTH * np.sin(a), PIVOT[1] + LENGTH * np.cos(a), rng) for a in theta]
+    else:
+        frames = [draw(200.0, 120.0, rng) for _ in range(n)]
+    film(path, frames)
+    with pytest.raises(JobError) as caught:
+        track(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_wrong_calls(plain):
+    with pytest.raises(UsageError):
+        track(plain[0], bob=(9999, 3))
+    with pytest.raises(UsageError):
+        track(plain[0], fps_factor=0)
+    with pytest.raises(UsageError):
+        track(plain[0], localiser="disk")
+
+
+def test_slow_motion_factor_scales_time(plain):
+    found = track(plain[0], fps_factor=4)
+    assert found.t_s[-1] == pytest.approx(plain[1][0][-1] / 4)
+
+
+def test_swing_fit_recovers_its_own_motion():
+    t = np.arange(0, 6, 1 / 60)
+    truth = np.array([320, -100, 400, 0.01, 9.0, 0.01, 0.02, 0.35, 0.1])
+    start = truth * 1.02
+    from toolkit.swing import Swing
+
+    x, y = Swing(truth, np.zeros((9, 9)), 0.0, 0.0).position(t)
+    rng = np.random.default_rng(1)
+    fitted = fit_swing(
+        t, x + rng.normal(0, 0.05, t.size), y + rng.normal(0, 0.05, t.size), np.full(t.size, 0.05), start
+    )
+    assert fitted is not None
+    assert fitted.rms_px == pytest.approx(0.05, rel=0.15)
+    sigma = np.sqrt(np.diag(fitted.covariance))
+    assert np.all(np.abs(fitted.values - truth) < 5 * sigma), dict(zip(NAMES, fitted.values))
+
+
+def test_pivot_by_arc_has_the_error_it_says():
+    rng = np.random.default_rng(2)
+    amplitude, sigma, n = 0.35, 0.03, 600
+    pulls = []
+    for _ in range(60):
+        theta = amplitude * np.sin(np.linspace(0, 40, n))
+        x, y = (
+            300 + 400 * np.sin(theta) + rng.normal(0, sigma, n),
+            -90 + 400 * np.cos(theta) + rng.normal(0, sigma, n),
+        )
+        found = arc_pivot(x, y, np.full(n, sigma), np.full(n, sigma))
+        pulls.append((found.xy - (300, -90)) / found.sigma_px)
+    assert 0.75 < np.std(pulls) < 1.25
+    # the closed form for a swing through a small angle, sampled evenly in time: σ_L = 4√2 σ/(√N θ₀²)
+    assert found.sigma_px[1] == pytest.approx(4 * np.sqrt(2) * sigma / np.sqrt(n) / amplitude**2, rel=0.2)
+
+
+def test_pivot_by_lines():
+    rng = np.random.default_rng(4)
+    angle = 0.05 * np.sin(np.linspace(0, 30, 200))
+    x, y = 300 + 350 * np.sin(angle), -90 + 350 * np.cos(angle)
+    measured = angle + rng.normal(0, 2e-4, angle.size)
+    found = line_pivot(x, y, measured, np.full(angle.size, 2e-4 * 350))
+    assert np.all(np.abs(found.xy - (300, -90)) < 4 * np.array(found.sigma_px))
+    assert found.sigma_px[0] < 0.02
+
+
+def test_circle_fit_is_exact_on_a_circle():
+    a = np.linspace(-0.4, 0.3, 25)
+    cx, cy, r, rms = fit_circle(10 + 50 * np.sin(a), -7 + 50 * np.cos(a))
+    assert (cx, cy, r) == pytest.approx((10, -7, 50), abs=1e-8)
+    assert rms < 1e-9
+
+
+def test_red_apple(shared_data):
+    found = track(shared_data / "redapple" / "redapple_480p.mov")
+    assert found.frame.size == 1299
+    assert found.ok.mean() >= 0.99
+    assert found.pivot_px[1] < 0
+
+
+@pytest.mark.parametrize("name", ["star", "leaf", "tree2"])
+def test_no_invented_pendulum(shared_data, name):
+    with pytest.raises(JobError, match="--bob"):
+        track(shared_data / "redapple" / f"{name}_480p.mov")
