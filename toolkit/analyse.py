@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -127,6 +127,7 @@ def analyse(
         clock = now
 
     series, found = measure(path, scene, progress=progress, **measuring)
+    scene = _with_what_the_recording_says(scene, series)
     stage_done("measure")
     from toolkit.diagnose import diagnose
     from toolkit.fit import choose_model, fit_models
@@ -146,6 +147,17 @@ def analyse(
         video=path if found is not None else None,
         timings_s=timings,
     )
+
+
+def _with_what_the_recording_says(scene: Scene, series: ThetaSeries) -> Scene:
+    """The scene with the mass that the recording's file gives (a Tracker project), where the scene gives none.
+
+    A length in such a file is what its user calibrated with, not a tape along the string: it stays in `meta`.
+    """
+    mass_kg = series.meta.get("mass_kg")
+    if mass_kg is None or scene.pendulum.mass_kg is not None:
+        return scene
+    return replace(scene, pendulum=replace(scene.pendulum, mass_kg=float(mass_kg)))
 
 
 def write_analysis(analysis: Analysis, folder: Path) -> list[Path]:

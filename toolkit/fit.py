@@ -71,6 +71,11 @@ class FitResult:
         """χ² per degree of freedom."""
         return self.chi2 / self.dof if self.dof > 0 else float("nan")
 
+    def _repr_html_(self) -> str:
+        from toolkit.report.notebook import fit_html
+
+        return fit_html(self)
+
 
 def fit(
     series: ThetaSeries,

@@ -100,3 +100,8 @@ class ThetaSeries:
         from toolkit.series_io.theta_csv import write
 
         write(self, Path(path))
+
+    def _repr_html_(self) -> str:
+        from toolkit.report.notebook import series_html
+
+        return series_html(self)

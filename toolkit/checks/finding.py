@@ -30,3 +30,8 @@ class Finding:
     strength_sigma: float | None = None
     words_key: str = ""
     words_values: Mapping[str, Any] = field(default_factory=dict)
+
+    def _repr_html_(self) -> str:
+        from toolkit.report.notebook import finding_html
+
+        return finding_html(self)
