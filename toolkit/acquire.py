@@ -140,9 +140,8 @@ def _follow(batch: list[Frame], start: int, h: Hypothesis, sight: Sight, radius:
             swing = _swing_of(batch, points, look)
     if swing is None or len(points) < max(12, 0.3 * len(batch)):
         return None
-    look = Look(
-        *(float(np.median([getattr(k, n) for k in looks])) for n in ("radius_px", "edge_px", "contrast", "noise"))
-    )
+    radius_px, edge, contrast, noise = (float(np.median([k[n] for k in looks])) for n in range(4))
+    look = Look(radius_px, edge, contrast, noise)
     if radius:
         look = look._replace(radius_px=radius)
     quality = abs(look.contrast) / (look.noise + 1.0)

@@ -69,7 +69,7 @@ def _compiled() -> Any:
     import numba
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def add(plane, mean, seen, x0, y0, x1, y1, bx, by, radius, px, py, factor, most):  # type: ignore[no-untyped-def]
+    def add(plane, mean, seen, x0, y0, x1, y1, bx, by, radius, px, py, factor, most):
         has_string = not np.isnan(px)
         ux, uy = px - bx, py - by
         length = np.sqrt(ux * ux + uy * uy) + 1e-9

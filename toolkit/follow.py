@@ -59,6 +59,7 @@ class Follower:
         self.interval_s = float(np.median(np.diff([f.t_s for f in batch]))) or 1 / 30
         self._print: np.ndarray | None = None
         points = self._learn_stillness(batch, rough)
+        self._found = {batch[i].index: p for i, p in points.items()}
         self._learn_background(batch, rough.look, points)
         self.look, self.exposure_s = self._learn_looks(batch, rough.look, points, radius)
         self.ordinary_misfit = self.look.noise
@@ -254,6 +255,8 @@ class Follower:
         """Measure one frame, in the order of the file."""
         shift = self._camera(frame)
         x, y, vx, vy = self._expect(frame.t_s)
+        if len(self.recent) < 3 and frame.index in self._found:
+            x, y = self._found[frame.index]  # the motion fitted to the start may be poor at its rim
         guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
         patch = self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)

@@ -101,7 +101,7 @@ def _vote(
 ) -> tuple[float, float, float]:
     """Centre (shrunken px) with most votes at signed distance `reach` along the gradient, and how many it has."""
     height, width = int(shape[0] / bin_size) + 3, int(shape[1] / bin_size) + 3
-    return tuple(_compiled()(columns, rows, nx, ny, weight, reach, bin_size, height, width))  # type: ignore[return-value]
+    return tuple(_compiled()(columns, rows, nx, ny, weight, reach, bin_size, height, width))
 
 
 @cache
@@ -109,7 +109,7 @@ def _compiled() -> Any:
     import numba
 
     @numba.njit(cache=True, nogil=True)
-    def vote(columns, rows, nx, ny, weight, reach, bin_size, height, width):  # type: ignore[no-untyped-def]
+    def vote(columns, rows, nx, ny, weight, reach, bin_size, height, width):
         # a bright bob's gradient points inwards, a dark one's outwards: `reach` carries the sign
         table = np.zeros((height, width), np.float32)
         for i in range(columns.size):

@@ -121,7 +121,7 @@ def _compiled() -> Any:
     import numba
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def follow(luma, windows, points, start, moved):  # type: ignore[no-untyped-def]
+    def follow(luma, windows, points, start, moved):
         rows, columns = luma.shape
         size = windows.shape[1]
         half = size // 2
@@ -142,7 +142,7 @@ def _compiled() -> Any:
             sx, sy = start[k, 0], start[k, 1]
             settled = False
             squares = 0.0
-            for turn in range(12):
+            for _ in range(12):
                 x0 = points[k, 0] - half + sx
                 y0 = points[k, 1] - half + sy
                 ix, iy = int(np.floor(x0)), int(np.floor(y0))

@@ -41,7 +41,7 @@ def _compiled() -> Any:
     import numba
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def ridge(luma, bx, by, px, py, radius, out):  # type: ignore[no-untyped-def]
+    def ridge(luma, bx, by, px, py, radius, out):
         rows, columns = luma.shape
         ux, uy = px - bx, py - by
         length = np.sqrt(ux * ux + uy * uy)
@@ -67,7 +67,7 @@ def _compiled() -> Any:
             out[5] = middle
             a = a0
             sections = int(min(100.0, end - start))
-            for turn in range(3):
+            for _ in range(3):
                 n00 = n01 = n11 = r0 = r1 = 0.0
                 # the height of the ridge is fitted with the line held, then the line with the height held
                 hh = hp = 0.0

@@ -83,7 +83,7 @@ def _compiled() -> Any:
     import numba
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def swing_rk4(w2, gamma, beta, theta, rate, t, out):  # type: ignore[no-untyped-def]
+    def swing_rk4(w2, gamma, beta, theta, rate, t, out):
         now = 0.0
         longest = 0.06 / np.sqrt(abs(w2) + 1e-12)
         for i in range(t.size):

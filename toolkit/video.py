@@ -202,9 +202,9 @@ def _luma(picture: Any) -> np.ndarray:
     deep = _DEEP_LUMA.match(name)
     if deep:
         plane = picture.planes[0]
-        rows = np.frombuffer(plane, np.uint16).reshape(plane.height, plane.line_size // 2)[:, : plane.width]
+        wide = np.frombuffer(plane, np.uint16).reshape(plane.height, plane.line_size // 2)[:, : plane.width]
         bits = int(deep.group(1))
-        return np.minimum((rows.astype(np.uint32) + (1 << (bits - 9))) >> (bits - 8), 255).astype(np.uint8)
+        return np.minimum((wide.astype(np.uint32) + (1 << (bits - 9))) >> (bits - 8), 255).astype(np.uint8)
     return np.ascontiguousarray(picture.to_ndarray(format="gray"))
 
 

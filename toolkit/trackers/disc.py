@@ -31,7 +31,7 @@ def compiled() -> Any:
     import numba
 
     @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
-    def products(slope, weight, rest, count, free, normal, right, weighted):  # type: ignore[no-untyped-def]
+    def products(slope, weight, rest, count, free, normal, right, weighted):
         for a in range(free):
             for i in range(count):
                 weighted[i] = slope[a, i] * weight[i]
@@ -46,7 +46,7 @@ def compiled() -> Any:
                 normal[a, b] = total
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decompose(normal, lower, free):  # type: ignore[no-untyped-def]
+    def decompose(normal, lower, free):
         for a in range(free):
             for b in range(a + 1):
                 value = normal[a, b] * (1.0 + 1e-9) if a == b else normal[a, b]
@@ -61,7 +61,7 @@ def compiled() -> Any:
         return True
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def solve(lower, right, step, free):  # type: ignore[no-untyped-def]
+    def solve(lower, right, step, free):
         for a in range(free):
             value = right[a]
             for b in range(a):
@@ -74,7 +74,7 @@ def compiled() -> Any:
             step[a] = value / lower[a, a]
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def fit(image, back, seen, start, streak, string_rad, string_half_rad, noise, contrast, free, turns, out):  # type: ignore[no-untyped-def]
+    def fit(image, back, seen, start, streak, string_rad, string_half_rad, noise, contrast, free, turns, out):
         rows, columns = image.shape
         cx, cy, radius, soft = start[0], start[1], start[2], start[3] * 2.6457513110645907
         bx, by = streak[0], streak[1]
