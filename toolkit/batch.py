@@ -85,7 +85,7 @@ def _analyse_one(path: Path, out: Path, scene: Scene, lang: str, formats: tuple[
         analysis, written = make_report(path, out, scene, formats=formats, lang=lang)
     except PendulabError as error:
         return BatchRow(path.name, False, " ".join(str(error).split()))
-    except Exception as error:  # noqa: BLE001  (one bad recording must not end a class)
+    except Exception as error:
         return BatchRow(path.name, False, f"unexpected trouble ({type(error).__name__}: {error})")
     verdicts = {finding.assumption: finding.verdict for finding in analysis.findings}
     numbers: dict[str, Any] = {
