@@ -38,6 +38,8 @@ def write_overlay(
     The pivot may lie outside the picture. Raises UsageError if lengths differ or out_path is not a video's
     name, JobError if the video holds none of the track's frames.
     """
+    import cv2
+
     from toolkit.camera.film import Film
     from toolkit.video import open_video
 
@@ -70,7 +72,7 @@ def write_overlay(
             _draw(picture, track, row, model, scale)
             # stamps must grow, whatever the file's own did
             last_stamp = max(float(track.t_s[row] - track.t_s[0]), last_stamp + 1e-3)
-            film.write(picture[:, :, ::-1], last_stamp)
+            film.write(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), last_stamp)
             written += 1
             progress("overlay", written / len(row_of))
         if not written:
