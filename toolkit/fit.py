@@ -172,13 +172,18 @@ def _shared(lead: FitResult, model: str) -> dict[str, float]:
 
 
 def choose_model(fits: Mapping[str, FitResult]) -> str:
-    """The name of the preferred model: the simplest whose AIC is within 2 of the lowest, among those that converged."""
+    """The name of the preferred model: the simplest whose AIC is within 2 of the lowest, among those that converged.
+
+    A small-angle model is preferred only where every full-sine model is worse by more than 2: with as many parameters the
+    full sine is the exact equation, and a free ω_g can hide what small angles get wrong.
+    """
     if not fits:
         raise UsageError("there are no fits to choose from; fit at least one model")
     good = {name: result for name, result in fits.items() if result.success} or dict(fits)
     lowest = min(result.aic for result in good.values())
     near = [name for name, result in good.items() if result.aic <= lowest + 2]
-    return min(near or list(good), key=lambda name: (len(good[name].free), good[name].aic))
+    exact = [name for name in near if name.startswith("full")]
+    return min(exact or near or list(good), key=lambda name: (len(good[name].free), good[name].aic))
 
 
 def _freed_length(

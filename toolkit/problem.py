@@ -108,20 +108,28 @@ class Problem:
             reduced["drive_phase"] += 2 * math.pi * reduced["f"] * self.shift_s
         return reduced, by
 
-    def motion(self, values: Mapping[str, float], t_s: np.ndarray | None = None, names: Sequence[str] = ()) -> Motion:
-        """The model at t_s (default: the points) with derivatives of θ and θ̇ by the reported `names`."""
+    def motion(
+        self,
+        values: Mapping[str, float],
+        t_s: np.ndarray | None = None,
+        names: Sequence[str] = (),
+        rates: bool = True,
+    ) -> Motion:
+        """The model at t_s (default: the points) with derivatives of θ and (`rates`) θ̇ by the reported `names`."""
         times = self.t_s if t_s is None else t_s
         reduced, by = self.reduce(values)
         self._refuse_runaway(reduced, float(times[-1]))
         needed = list(dict.fromkeys(c for name in names for c in by.get(name, {})))
         stretched = times * (1 + values.get("time_scale", 0.0))
-        base = self.model.motion(reduced, stretched, needed)
-        d_theta, d_omega = np.zeros((2, times.size, len(names)))
+        base = self.model.motion(reduced, stretched, needed, rates)
+        d_theta = np.zeros((len(names), times.size)).T  # column by column in memory
+        d_omega = np.zeros((len(names), times.size if rates else 0)).T
         for i, name in enumerate(names):
             for coefficient, factor in by.get(name, {}).items():
                 column = needed.index(coefficient)
                 d_theta[:, i] += factor * base.d_theta[:, column]
-                d_omega[:, i] += factor * base.d_omega[:, column]
+                if rates:
+                    d_omega[:, i] += factor * base.d_omega[:, column]
             if name == "time_scale":
                 d_theta[:, i] = base.omega * times
         return Motion(base.theta, base.omega, d_theta, d_omega, base.method)
@@ -141,24 +149,25 @@ class Problem:
             + 4 / (3 * math.pi) * min(reduced.get("beta", 0.0), 0.0) * omega * peak
         )
         rate += 2 * min(reduced.get("mu", 0.0), 0.0) / (math.pi * omega * max(peak, 1e-3))
-        if rate * stop_s < -3:
+        steeper = 4 / (3 * math.pi) * min(reduced.get("beta", 0.0), 0.0) * omega * peak
+        if rate * stop_s < -3 or steeper * stop_s < -0.7:  # at −1 such a swing grows beyond bounds
             raise ArithmeticError("negative drag makes the motion run away")
 
     def predict(self, values: Mapping[str, float], names: Sequence[str]) -> tuple[np.ndarray, np.ndarray, Motion]:
         """What the camera should see, (n,), its derivatives (n, k) by `names`, and the motion itself.
 
-        The last answer is kept: a minimiser asks for the residuals and the Jacobian of one point in turn.
+        The last two answers are kept: a minimiser asks for the residuals and the Jacobian of one point in turn.
         """
-        point = (tuple(values.items()), tuple(names))
-        if self._last.get("point") != point:
-            self._last.clear()
-            self._last["answer"] = self._predicted(values, names)
-            self._last["point"] = point
-        seen, by, motion = self._last["answer"]
-        return seen.copy(), by.copy(), motion
+        point = (frozenset(values.items()), tuple(names))
+        if point not in self._last:
+            while len(self._last) > 1:
+                del self._last[next(iter(self._last))]
+            self._last[point] = self._predicted(values, names)
+        answer: tuple[np.ndarray, np.ndarray, Motion] = self._last[point]
+        return answer
 
     def _predicted(self, values: Mapping[str, float], names: Sequence[str]) -> tuple[np.ndarray, np.ndarray, Motion]:
-        motion = self.motion(values, None, names)
+        motion = self.motion(values, None, names, rates=False)
         scale = 1 + values.get("angle_scale", 0.0)
         seen = scale * motion.theta + values.get("theta_offset", 0.0)
         by = scale * motion.d_theta
@@ -183,7 +192,7 @@ class Problem:
             )
         attempts = []
         for begin in self._starts(start):
-            found = self._descend(begin, self.free)
+            found = self._descend_bounded(begin)
             if found is None:
                 continue
             attempts.append(found)
@@ -191,8 +200,7 @@ class Problem:
                 break
         if not attempts:
             return self._failed("the equation could not be solved from any start; check the times and angles", None)
-        best = min(attempts, key=lambda a: a.cost)
-        return self._report(self._bounded(best, {**best.values, **start}))
+        return self._report(min(attempts, key=lambda a: a.cost))
 
     def with_input(self, name: str, change: float) -> Problem:
         """The same problem with an input moved: mass, length, g, bob_radius (SI), vertical (rad), angle_scale and
@@ -243,8 +251,8 @@ class Problem:
 
     def values_at_best(self, start: Mapping[str, float]) -> dict[str, float] | None:
         """Parameter values of the best fit from `start`, drags ≥ 0, without error bars; None where it fails."""
-        found = self._descend({**self.values, **start}, self.free)
-        return None if found is None else self._bounded(found, found.values).values
+        found = self._descend_bounded({**self.values, **start})
+        return None if found is None else found.values
 
     def _starts(self, start: Mapping[str, float]) -> Iterator[dict[str, float]]:
         """First the guess (with what is given in its place), then others, each cheaper to compute than a fit."""
@@ -262,7 +270,8 @@ class Problem:
 
     def _follows(self, values: Mapping[str, float]) -> bool:
         """Whether a start already explains half of the record's spread; one that does not is worth less than the guess."""
-        residual, _ = self._residuals(values, (), self.series.theta_rad, np.ones(len(self.series)))
+        free = tuple(name for name in self.free if name not in self._held(values))  # the minimiser asks for these next
+        residual, _ = self._residuals(values, free, self.series.theta_rad, np.ones(len(self.series)))
         measured = residual[: len(self.series)]
         return bool(np.mean(measured**2) < 0.5 * np.var(self.series.theta_rad))
 
@@ -343,7 +352,7 @@ class Problem:
                 ),
                 sigma=self.sigma[:stop],
             )
-            found = part._descend(begin, self.free)
+            found = part._descend_bounded(begin)
             if found is not None:
                 begin = found.values
         yield begin
@@ -372,7 +381,8 @@ class Problem:
             valued = parameters.valuesdict()
             point = tuple(valued[name] for name in free)
             if point not in cache:
-                cache.clear()
+                while len(cache) > 2:
+                    del cache[next(iter(cache))]
                 cache[point] = self._residuals({**held, **dict(zip(free, point))}, free, measured, weight)
             return cache[point]
 
@@ -388,7 +398,12 @@ class Problem:
             try:
                 if self.loss == "linear":
                     outcome = minimizer.minimize(
-                        method="leastsq", Dfun=lambda p: evaluate(p)[1], ftol=1e-9, xtol=1e-9, factor=1.0
+                        method="leastsq",
+                        Dfun=lambda p: evaluate(p)[1].T,
+                        col_deriv=1,
+                        ftol=1e-8,
+                        xtol=1e-9,
+                        factor=1.0,
                     )
                 else:
                     sizes = np.linalg.norm(evaluate(parameters)[1], axis=0)
@@ -426,30 +441,63 @@ class Problem:
         if not whole:
             return np.full(measured.size + rows, _BAD), np.zeros((measured.size + rows, len(free)))
         residual = np.empty(measured.size + rows)
-        jacobian = np.zeros((measured.size + rows, len(free)))
+        jacobian = np.zeros((len(free), measured.size + rows)).T
         residual[: measured.size] = (measured - seen) * weight
-        jacobian[: measured.size] = -by * weight[:, None]
+        np.multiply(by, -weight[:, None], out=jacobian[: measured.size])
         for i, (name, (mean, u)) in enumerate(self.priors.items(), start=measured.size):
             residual[i] = (values[name] - mean) / u
             if name in free:
                 jacobian[i, free.index(name)] = 1 / u
         return residual, jacobian
 
-    def _bounded(self, found: Solved, begin: Mapping[str, float]) -> Solved:
-        """The same with every drag ≥ 0: those that came out negative are held at zero and the others fitted again."""
-        zero: tuple[str, ...] = ()
-        while True:
-            negative = [n for n in self.free if n in _DRAG_NAMES and n not in zero and found.values[n] < 0]
-            if not negative:
-                return replace(found, at_zero=zero)
-            zero = (*zero, *negative)
-            free = tuple(name for name in self.free if name not in zero)
-            nothing = dict.fromkeys(zero, 0.0)
-            tries = (self._descend({**values, **nothing}, free) for values in (found.values, begin))
-            again = [t for t in tries if t is not None]
-            if not again:
-                return replace(found, values={**found.values, **nothing}, success=False, at_zero=zero)
-            found = min(again, key=lambda a: a.cost)
+    def _held(self, values: Mapping[str, float]) -> tuple[str, ...]:
+        """The drags that start at zero wait there until the fit asks for them, all but the first of a drag-free start."""
+        drags = [name for name in self.free if name in _DRAG_NAMES]
+        zero = [name for name in drags if not values[name] > 0]
+        return tuple(zero[1:] if len(zero) == len(drags) else zero)
+
+    def _descend_bounded(self, begin: Mapping[str, float]) -> Solved | None:
+        """The least cost with every drag ≥ 0, by Lawson and Hanson's active set: drags that come out negative are held at
+        zero, and of those held the one is freed that promises most, until none promises anything."""
+        zero = self._held(begin)
+        values = {n: max(v, 0.0) if n in _DRAG_NAMES and n in self.free else v for n, v in begin.items()}
+        best: Solved | None = None
+        for _ in range(12):
+            found = self._descend(values, tuple(name for name in self.free if name not in zero))
+            if found is None:
+                return best
+            negative = tuple(n for n in self.free if n in _DRAG_NAMES and n not in zero and found.values[n] < 0)
+            values = {**found.values, **dict.fromkeys(negative, 0.0)}
+            zero += negative
+            if negative:
+                continue
+            if best is not None and found.cost >= best.cost:
+                return best
+            best = replace(found, at_zero=zero)
+            wanted = self._wanted(found, zero)
+            if wanted is None:
+                return best
+            zero = tuple(name for name in zero if name != wanted)
+        return best
+
+    def _wanted(self, found: Solved, zero: tuple[str, ...]) -> str | None:
+        """Which of the drags held at zero would lower the cost most if it grew, to first order; None where none would."""
+        if not zero:
+            return None
+        residual, jacobian = self._residuals(found.values, self.free, self.series.theta_rad, 1 / self.sigma)
+        if not residual[0] < _BAD:
+            return None
+        own = jacobian[:, [i for i, name in enumerate(self.free) if name not in zero]]
+        size = np.linalg.norm(own, axis=0)
+        basis, _ = np.linalg.qr(own / np.where(size > 0, size, 1.0))
+        gains = {}
+        for name in zero:
+            column = jacobian[:, self.free.index(name)]
+            column = column - basis @ (basis.T @ column)
+            slope, length2 = float(column @ residual), float(column @ column)
+            gains[name] = slope**2 / length2 if slope < 0 and length2 > 0 else 0.0
+        wanted = max(gains, key=lambda name: gains[name])
+        return wanted if gains[wanted] > 1e-3 * found.cost / residual.size else None
 
     def _report(self, found: Solved) -> FitResult:
         from toolkit.derived import derive

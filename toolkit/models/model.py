@@ -46,7 +46,7 @@ _ACCURACY_RAD = 1e-9
 class Motion:
     """A model's motion at n times: θ (n,) in rad, θ̇ (n,) in rad/s, and both derived by each coefficient asked for.
 
-    d_theta, d_omega : (n, k), one column a name in the order asked for.
+    d_theta, d_omega : (n, k), one column a name in the order asked for; d_omega has no rows where it was not asked for.
     """
 
     theta: np.ndarray
@@ -138,8 +138,11 @@ class Model:
             raise UsageError(f"model {self.name!r} needs the bob's radius: give --bob-radius-m")
         return constants
 
-    def motion(self, values: Mapping[str, float], t_s: np.ndarray, by: Sequence[str] = ()) -> Motion:
-        """θ(t), θ̇(t) at `t_s` (increasing, ≥ 0) and their derivatives by the coefficients named in `by`.
+    def motion(
+        self, values: Mapping[str, float], t_s: np.ndarray, by: Sequence[str] = (), rates: bool = True
+    ) -> Motion:
+        """θ(t), θ̇(t) at `t_s` (increasing, ≥ 0) and their derivatives by the coefficients named in `by` (those of θ̇ only
+        where `rates`).
 
         `values` holds theta0, phi, omega_g and `coefficients`. The start follows CONVENTIONS.md: with κ = sin(θ₀/2),
         sin(θ(0)/2) = κ sin φ and θ̇(0) = 2 κ ω_g cos φ; for small angles θ(0) = θ₀ sin φ, θ̇(0) = θ₀ ω_g cos φ.
@@ -150,7 +153,7 @@ class Model:
         start = self._start(values)
         if self.fixed or "cosine_drive" in self.effects:
             return self._moved(parameters, scale, start, values, t_s, by)
-        return self._free(parameters, scale, start, values, t_s, by)
+        return self._free(parameters, scale, start, values, t_s, by, rates)
 
     def _parameters(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
         """The equation's parameters, and by how much each grows with its reduced coefficient."""
@@ -205,6 +208,7 @@ class Model:
         values: Mapping[str, float],
         t_s: np.ndarray,
         by: Sequence[str],
+        rates: bool,
     ) -> Motion:
         """The reduced equation without a drive. Two variational equations fewer: time does not appear in it, so a shift
         in time (θ̇, θ̈) is the derivative along one start; and a unit of time can be chosen, so that
@@ -221,10 +225,13 @@ class Model:
         theta, omega = solution.theta_rad, solution.omega_rad_per_s
         if not by:
             return Motion(theta, omega, np.empty((len(t_s), 0)), np.empty((len(t_s), 0)), solution.method)
-        acceleration = self._acceleration(values, theta, omega)
+        acceleration = self._acceleration(values, theta, omega) if rates else omega
         at_start = float(self._acceleration(values, start.theta, start.omega))
-        d_theta, d_omega = np.empty((2, len(t_s), len(by)))
+        d_theta = np.empty((len(by), len(t_s))).T  # column by column in memory
+        d_omega = np.empty((len(by), len(t_s) if rates else 0)).T
         for block, out, rate in ((solution.d_theta, d_theta, omega), (solution.d_omega, d_omega, acceleration)):
+            if not out.size:
+                continue
             along = {name: scale[name] * block[:, i] for i, name in enumerate(coefficients)}
             for i, name in enumerate(by):
                 if name in along:
