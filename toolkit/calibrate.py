@@ -24,6 +24,11 @@ from toolkit.swing import fit_circle, fit_swing, start_swing
 from toolkit.track import LOST, PREDICTED, Track
 
 _CLICK_SIGMA_PX = 1.0
+# What one picture plane cannot tell, as standard uncertainties of the scale of all angles. Alone, an arc or a string hides a
+# camera some 8° off square (1 − cos 8°) or a phone's uncorrected lens. Together they show either, save for what a pitch
+# of a few degrees from near adds to the arc's radius alone.
+_VIEW_U = 0.01
+_ARC_U = 0.006
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,7 @@ class PivotEstimate:
     """A pivot (x, y) in px with its (2, 2) covariance, how it was found, and the goodness of that fit.
 
     slant (2, 2) turns what was seen at a slant, about the pivot, into the plane of swing; None for a square view.
+    view_u is the relative standard uncertainty of all angles from what the camera's tilt and lens may have done.
     """
 
     xy: np.ndarray
@@ -38,6 +44,7 @@ class PivotEstimate:
     method: str
     reduced_chi2: float = 1.0
     slant: np.ndarray | None = None
+    view_u: float = _VIEW_U
 
     @property
     def sigma_px(self) -> tuple[float, float]:
@@ -49,7 +56,8 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     """θ(t) of the measured frames (predicted and lost ones are left out), with σ.
 
     The σ of each frame is random; what is common to all is in the meta: `angle_scale_relative_u` (pivot along the
-    vertical) and `vertical_sigma_rad`. meta["calibration"] is the content of calibration.json.
+    vertical; what the camera's tilt and lens may do, `angle_scale_relative_u_of_view`) and `vertical_sigma_rad`.
+    meta["calibration"] is the content of calibration.json.
     Raises JobError where too few frames were measured or times do not increase.
     """
     t, x, y, sx, sy, kept = _measured(track)
@@ -66,7 +74,7 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     vertical, vertical_sigma = _vertical(track, t, x, y, sx, sy, pivot)
     theta = direction - vertical
     sigma = np.hypot(np.cos(direction) * sx, np.sin(direction) * sy) / distance
-    scale_u = pivot.sigma_px[1] / length
+    scale_u = float(np.hypot(pivot.sigma_px[1] / length, pivot.view_u))
     amplitude = float(np.percentile(np.abs(theta), 99))
     calibration: dict[str, Any] = {
         "pivot_px": [float(px), float(py)],
@@ -77,6 +85,9 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
         "radius_sigma_px": float(track.meta.get("radius_sigma_px", 0.1)),
         "vertical_rad": vertical,
         "vertical_sigma_rad": vertical_sigma,
+        "angle_scale_relative_u": scale_u,
+        "angle_scale_relative_u_of_pivot": pivot.sigma_px[1] / length,
+        "angle_scale_relative_u_of_view": pivot.view_u,
         "length_px": length,
         "length_sigma_px": pivot.sigma_px[1],
         "fps": track.meta.get("fps"),
@@ -99,13 +110,20 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     )
     log.append(
         f"Angles up to {np.degrees(amplitude):.1f}°; random error of one frame {np.degrees(np.median(sigma)):.4f}°, "
-        f"common relative error of all angles {scale_u:.2g} (from the pivot)."
+        f"common relative error of all angles {scale_u:.2g} ({pivot.sigma_px[1] / length:.2g} from the pivot, "
+        f"{pivot.view_u:.2g} from the camera's view)."
     )
+    if pivot.slant is None and pivot.view_u >= _VIEW_U:
+        log.append(
+            f"Camera tilt not distinguishable from this clip: angles may be scaled by about {pivot.view_u:.1%} (assumed: a camera "
+            "within some 8° of square, or a phone's lens). A visible string and a larger swing would tell."
+        )
     meta = {
         "source": track.meta.get("source", "track"),
         "log": log,
         "warnings": warnings,
         "angle_scale_relative_u": scale_u,
+        "angle_scale_relative_u_of_view": pivot.view_u,
         "vertical_sigma_rad": vertical_sigma,
         "exposure_s": track.meta.get("exposure_s"),
         "calibration": calibration,
@@ -215,6 +233,10 @@ def _pivot(
     gain = arc.covariance @ np.linalg.inv(both)
     xy = arc.xy - gain @ difference
     covariance = arc.covariance - gain @ arc.covariance
+    # a view that scales angles by 1 + ε scales the arc's radius by 1 + 2ε against the string's length
+    away = float(np.hypot(*(np.mean([x, y], axis=1) - xy)))
+    apart = np.hypot(float(np.hypot(*difference)) if chi2 > 11.8 else 0.0, np.sqrt(both[1, 1])) / away
+    view_u = 0.5 * float(np.hypot(apart, _ARC_U))
     if chi2 > 11.8:  # 3σ for two numbers
         said = (
             f"the pivot by the arc and by the string differ by {np.hypot(*difference):.1f} px ({np.sqrt(chi2):.0f}σ): "
@@ -222,9 +244,9 @@ def _pivot(
         )
         slant = _slant(x - lines.xy[0], y - lines.xy[1])
         if slant is None:
-            away = np.hypot(*(np.mean([x, y], axis=1) - xy))
-            warnings.append(f"{said}; angles may be wrong by about {np.hypot(*difference) / away:.1%}")
-            return PivotEstimate(xy, covariance * chi2 / 2, "the arc and the string's lines together", chi2)
+            warnings.append(f"{said}; angles may be wrong by about {view_u:.1%}")
+            method = "the arc and the string's lines together"
+            return PivotEstimate(xy, covariance * chi2 / 2, method, chi2, view_u=view_u)
         # seen at a slant a circle is an ellipse; the string's lines still meet in its centre
         small, large = np.linalg.eigvalsh(slant)
         tilt = float(np.degrees(np.arccos(small / large)))
@@ -232,10 +254,9 @@ def _pivot(
             f"{said}; read as a view at a slant of {tilt:.0f}°, which was taken out; for it angles are uncertain by "
             f"{(large / small - 1) / 3:.1%}"
         )
-        reach = (large / small - 1) / 3 * float(np.median(np.hypot(x - lines.xy[0], y - lines.xy[1])))
-        spread = lines.covariance + np.diag([0.0, reach**2])
-        return PivotEstimate(lines.xy, spread, "the string's lines, the arc seen at a slant", chi2, slant)
-    return PivotEstimate(xy, covariance, "the arc and the string's lines together")
+        view_u = max(_ARC_U / 2, (large / small - 1) / 3)
+        return PivotEstimate(lines.xy, lines.covariance, "the string's lines, the arc seen at a slant", chi2, slant, view_u)
+    return PivotEstimate(xy, covariance, "the arc and the string's lines together", view_u=min(view_u, _VIEW_U))
 
 
 def _slant(dx: np.ndarray, dy: np.ndarray) -> np.ndarray | None:

@@ -202,6 +202,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     x, y = x + shift.raw_x - shift.x, y + shift.raw_y - shift.y
     swing = _whole_swing(start, t, x, y, good, video.path)
     _require_pendulum(swing, t, x, y, good, video.path)
+    warnings += _poor_motion(swing, t, good, follower)
     mx, my = swing.position(t)
     slips = _clock_slips(t, x - mx, y - my, swing, good)
     if slips.size:
@@ -403,7 +404,7 @@ def _clock_slips(t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, go
     n = 7
     if chosen.size < 4 * n:
         return np.array(slips, int)
-    leap, off = np.zeros(chosen.size), np.full(chosen.size, np.inf)
+    leap, off, bent = np.zeros(chosen.size), np.full(chosen.size, np.inf), np.zeros(chosen.size)
     for i in range(n, chosen.size - n):
         a, b = chosen[i - n : i], chosen[i : i + n]
         if b[-1] - a[0] > 3 * n:
@@ -412,13 +413,17 @@ def _clock_slips(t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, go
         before, after = (np.polyfit(p - middle, ahead[p], 1) for p in (a, b))
         rest = np.concatenate([ahead[p] - np.polyval(f, p - middle) for p, f in ((a, before), (b, after))])
         leap[i], off[i] = after[1] - before[1], np.sqrt(np.mean(rest**2))
+        both = chosen[i - n : i + n]
+        smooth = np.polyfit(both - middle, ahead[both], 3)
+        bent[i] = np.sqrt(np.mean((ahead[both] - np.polyval(smooth, both - middle)) ** 2))
+    # a leap of a whole frame, far above the scatter, that no bend of the motion explains
+    sharp = (off < 0.06) & (bent > 2.5 * off) & (np.abs(leap - np.round(leap)) < 0.03 + 3 * off)
     while True:
-        i = int(np.argmax(np.where(off < 0.12, np.abs(leap), 0)))
-        whole = round(float(leap[i]))
-        if whole == 0 or off[i] >= 0.12 or abs(leap[i] - whole) > 0.3:
+        i = int(np.argmax(np.where(sharp, np.abs(leap), 0)))
+        if not sharp[i] or round(float(leap[i])) == 0:
             break
         slips.append(int(chosen[i]))
-        leap[max(0, i - n) : i + n] = 0
+        sharp[max(0, i - n) : i + n] = False
     return np.array(sorted(slips), int)
 
 
@@ -441,14 +446,55 @@ def _require_pendulum(swing: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray,
     reasons = []
     if swing.rms_px > max(0.04 * extent, 0.3):
         reasons.append(f"it strays {swing.rms_px:.1f} px from a swing of {extent:.0f} px")
+    if good.mean() < 0.6 and swing.rms_px > 0.015 * extent:
+        reasons.append(f"it was seen on {good.mean():.0%} of the frames, straying {swing.rms_px:.1f} px")
     if not 0 < amplitude < np.pi:
         reasons.append("it does not turn back")
-    if swing.values[5] * span < -0.5:
-        reasons.append("its swing grows")
+    growth, growth_sigma = _growth(swing, t[good])
+    if growth - 3 * growth_sigma > 0.5:
+        reasons.append(f"its swing grows by {np.expm1(growth):.0%}")
     if swing.values[4] <= 0:
         reasons.append("nothing pulls it back")
     if reasons:
         raise JobError(f"what moves in {path} is no pendulum ({reasons[0]}); if there is one, {REMEDY}")
+
+
+def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:
+    """How much the amplitude grew from the first to the last time (natural logarithm), and its standard uncertainty."""
+    ends = np.array([t[0], t[-1]])
+
+    def grown(values: np.ndarray) -> float:
+        theta, rate = Swing(values, swing.covariance, swing.t0_s, swing.rms_px).angle(ends)
+        energy = 0.5 * rate**2 + values[4] * (1 - np.cos(theta))
+        return 0.5 * float(np.log(max(energy[1], 1e-12) / max(energy[0], 1e-12)))
+
+    now = grown(swing.values)
+    sigma = np.sqrt(np.diag(swing.covariance))
+    slope = np.zeros(sigma.size)
+    for i in range(4, 9):
+        moved = swing.values.copy()
+        moved[i] += 0.1 * sigma[i]
+        slope[i] = (grown(moved) - now) / (0.1 * sigma[i]) if sigma[i] > 0 else 0.0
+    return now, float(np.sqrt(max(slope @ swing.covariance @ slope, 0.0)))
+
+
+def _poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, follower: Follower) -> list[str]:
+    """Sentences on a motion that was accepted, but is not quite that of a pendulum."""
+    said = []
+    growth, sigma = _growth(swing, t[good])
+    if growth > 0.02 + 4 * sigma:
+        said.append(
+            f"the swing grows by {np.expm1(growth):.1%}: it is driven, or swings towards the camera by turns; a free decay "
+            "does not describe it"
+        )
+    if swing.rms_px > max(0.5, 0.02 * follower.look.radius_px):
+        said.append(
+            f"the bob's place scatters by {swing.rms_px:.2f} px about a smooth swing, far more than its picture explains; the "
+            "error bars were widened, but a steady error of that size is possible"
+        )
+    if good.mean() < 0.8:
+        said.append(f"the bob was measured on only {good.mean():.0%} of the frames")
+    return said
 
 
 def _true_sigma(

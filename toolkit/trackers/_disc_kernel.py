@@ -212,7 +212,8 @@ def fit(image, back, seen, start, streak, string_rad, string_half_rad, noise, co
                     beyond += 1
                 taken += 1
                 keep = abs(off) <= cut
-                if last:
+                if last and alpha > 0.5:
+                    # what hides the bob is seen on it, what stands behind it only beside it
                     # sectors of equal diamond angle: no arctangent
                     turn_of = dy / (abs(dx) + abs(dy) + 1e-12)
                     sector = int((1.0 + turn_of if dx >= 0.0 else 3.0 - turn_of) * 5.999999)
