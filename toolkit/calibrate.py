@@ -74,6 +74,9 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     vertical, vertical_sigma = _vertical(track, t, x, y, sx, sy, pivot)
     theta = direction - vertical
     sigma = np.hypot(np.cos(direction) * sx, np.sin(direction) * sy) / distance
+    rounding = float(track.meta.get("time_sigma_s", 0.0))  # a file that keeps times to the millisecond only
+    if rounding > 0:
+        sigma = np.hypot(sigma, np.abs(np.gradient(direction, t)) * rounding)
     scale_u = float(np.hypot(pivot.sigma_px[1] / length, pivot.view_u))
     amplitude = float(np.percentile(np.abs(theta), 99))
     calibration: dict[str, Any] = {
@@ -255,7 +258,9 @@ def _pivot(
             f"{(large / small - 1) / 3:.1%}"
         )
         view_u = max(_ARC_U / 2, (large / small - 1) / 3)
-        return PivotEstimate(lines.xy, lines.covariance, "the string's lines, the arc seen at a slant", chi2, slant, view_u)
+        return PivotEstimate(
+            lines.xy, lines.covariance, "the string's lines, the arc seen at a slant", chi2, slant, view_u
+        )
     return PivotEstimate(xy, covariance, "the arc and the string's lines together", view_u=min(view_u, _VIEW_U))
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from toolkit.acquire import Rough, cut, extrapolate
+from toolkit.acquire import Rough, cut
 from toolkit.background import Background
 from toolkit.stillness import STILL, Anchors, CameraShift
 from toolkit.string_line import measure_string
@@ -55,6 +55,8 @@ class Follower:
         self.swing = rough.swing
         self.record = Record()
         self.hidden = 0
+        self.astray = 0.0  # how far the bob was from the fitted motion lately, px
+        self._fitted_at = 0
         self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
         self.interval_s = float(np.median(np.diff([f.t_s for f in batch]))) or 1 / 30
         self._print: np.ndarray | None = None
@@ -270,6 +272,8 @@ class Follower:
         r.repeated.append(self._is_repeat(frame))
         if ok and patch is not None:
             self.hidden = 0
+            if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
+                self._refit()
             self.recent.append((frame.t_s, place.x_px, place.y_px))
             self._update_background(patch, place, guess)
             if len(r.index) % _STRING_EVERY == 1:
@@ -302,21 +306,31 @@ class Follower:
         )
 
     def _expect(self, t: float) -> tuple[float, float, float, float]:
-        """Where the bob should be at time t and how fast, px and px/s."""
-        recent = list(self.recent)
-        step = self.interval_s
-        if self.hidden < 2 and len(recent) == 3 and t - recent[0][0] < 6 * step:
-            x, y = extrapolate(recent, t)
-            x1, y1 = extrapolate(recent, t + 0.5 * step)
-            x0, y0 = extrapolate(recent, t - 0.5 * step)
-            return x, y, (x1 - x0) / step, (y1 - y0) / step
-        at = np.array([t])
-        (px, py), (vx, vy) = self.swing.position(at), self.swing.velocity(at)
-        return float(px[0]), float(py[0]), float(vx[0]), float(vy[0])
+        """Where the bob should be at time t and how fast, px and px/s: the fitted motion, moved by how far the bob was
+        from it in the last frames."""
+        recent = list(self.recent)[-2:]
+        if recent and abs(t - self.swing.t0_s) > 1.0:  # start anew from near by, so that no long way is integrated
+            self.swing = replace(self.swing, values=_restarted(self.swing, recent[-1][0]), t0_s=recent[-1][0])
+        theta, rate = self.swing.angle(np.array([*(r[0] for r in recent), t]))
+        v = self.swing.values
+        direction = theta + v[3]
+        xs, ys = v[0] + v[2] * np.sin(direction), v[1] + v[2] * np.cos(direction)
+        x, y = float(xs[-1]), float(ys[-1])
+        vx, vy = (float(v[2] * rate[-1] * f) for f in (np.cos(direction[-1]), -np.sin(direction[-1])))
+        if not recent:
+            return x, y, vx, vy
+        offs = [(r[1] - a, r[2] - b) for r, a, b in zip(recent, xs, ys)]
+        (ox, oy), far = offs[-1], t - recent[-1][0]
+        if len(recent) == 2 and not self.hidden and recent[1][0] > recent[0][0]:
+            lead = min(1.0, far / (recent[1][0] - recent[0][0]))
+            ox, oy = ox + lead * (ox - offs[0][0]), oy + lead * (oy - offs[0][1])
+        self.astray = float(np.hypot(ox, oy))
+        return x + ox, y + oy, vx, vy
 
     def _refit(self) -> None:
         """Fit the motion to what was measured last, to see through a gap."""
         r = self.record
+        self._fitted_at = len(r.index)
         good = [k for k in range(max(0, len(r.ok) - 600), len(r.ok)) if r.ok[k]]
         if len(good) < 20:
             return

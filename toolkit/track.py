@@ -191,6 +191,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     log: list[str] = []
     warnings: list[str] = []
     t = _even_times(np.array(r.t_s), video, log)
+    evened = bool(log)
     t = t - t[0]
     x, y, sx, sy = (np.array([getattr(p, n) for p in r.place]) for n in ("x_px", "y_px", "sigma_x_px", "sigma_y_px"))
     good = np.array(r.ok)
@@ -213,7 +214,9 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     good = good & ~_out_of_time(r, t, x - mx, y - my, swing, good, warnings)
     for a in (x, y, sx, sy):
         a[~good] = np.nan
-    scale = _true_sigma(x - mx, y - my, sx, sy, good, shift.sigma)
+    time_sigma = video.tick_s / np.sqrt(12) if video.tick_s > 2e-4 and not evened else 0.0
+    vx, vy = (np.hypot(v * time_sigma, shift.sigma) for v in swing.velocity(t))
+    scale = _true_sigma(x - mx, sx, good, vx), _true_sigma(y - my, sy, good, vy)
     sx, sy = sx * scale[0], sy * scale[1]
     status = np.where(good, OK, LOST).astype("U9")
     bridged = _bridged(good, t, swing.period_s)
@@ -267,6 +270,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             "shift_x_px": shift.x,
             "shift_y_px": shift.y,
             "shift_sigma_px": shift.sigma,
+            "time_sigma_s": time_sigma / fps_factor,
             "string_x_px": strings[:, 0],
             "string_y_px": strings[:, 1],
             "string_angle_rad": strings[:, 2],
@@ -489,23 +493,30 @@ def _poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, follower: Follow
         )
     if swing.rms_px > max(0.5, 0.02 * follower.look.radius_px):
         said.append(
-            f"the bob's place scatters by {swing.rms_px:.2f} px about a smooth swing, far more than its picture explains; the "
-            "error bars were widened, but a steady error of that size is possible"
+            f"the bob's places stray {swing.rms_px:.2f} px (rms) from a plane pendulum's swing on a circle: the camera was tilted "
+            "or shook, its lens distorts, the bob swung out of the plane, or it was not followed well"
         )
     if good.mean() < 0.8:
         said.append(f"the bob was measured on only {good.mean():.0%} of the frames")
     return said
 
 
-def _true_sigma(
-    rx: np.ndarray, ry: np.ndarray, sx: np.ndarray, sy: np.ndarray, good: np.ndarray, others: np.ndarray
-) -> tuple[float, float]:
-    """Factors that make the fit's σ agree with the scatter about the motion, less `others` (the shake's noise)."""
-    factors = []
-    for r, s in ((rx, sx), (ry, sy)):
-        square = float(np.mean((r[good] ** 2 - others[good] ** 2) / s[good] ** 2))
-        factors.append(float(np.sqrt(max(square, 0.25))))
-    return factors[0], factors[1]
+def _true_sigma(r: np.ndarray, s: np.ndarray, good: np.ndarray, others: np.ndarray) -> float:
+    """The factor that makes the fit's σ `s` agree with the scatter of the residuals `r` from frame to frame, less that of
+    `others` (the shake, the clock). What bends slowly is no error of a frame but of the motion assumed, and is taken out."""
+    square = _scatter(r[good] / s[good]) ** 2
+    known = float(np.mean((others[good] / s[good]) ** 2))
+    return float(np.sqrt(max(square - known, 0.5 * square, 0.25)))
+
+
+def _scatter(r: np.ndarray, width: int = 15) -> float:
+    """Standard deviation of a series (n,) about parabolas through `width` neighbours."""
+    if r.size < 2 * width:
+        return float(np.sqrt(np.mean(r**2)))
+    half = width // 2
+    kernel = np.linalg.pinv(np.vander(np.arange(-half, half + 1), 3, increasing=True))[0]
+    rest = r[half:-half] - np.convolve(r, kernel[::-1], "valid")
+    return float(np.sqrt(np.mean(rest**2) / (1 - kernel[half])))
 
 
 def _even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:

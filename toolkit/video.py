@@ -360,7 +360,12 @@ def clock_warnings(t_s: np.ndarray, video: Video) -> list[str]:
     mean = (t_s.size - 1) / (t_s[-1] - t_s[0])
     claimed = video.fps_header
     # a header may count one frame more or less over the same time
-    if claimed and video.time_source == "pts" and not jumps.size and abs(claimed / mean - 1) > max(1e-3, 1.1 / t_s.size):
+    if (
+        claimed
+        and video.time_source == "pts"
+        and not jumps.size
+        and abs(claimed / mean - 1) > max(1e-3, 1.1 / t_s.size)
+    ):
         said.append(
             f"the header claims {claimed:.4f} frames per second, the time stamps give {mean:.4f}: times follow the stamps; if the "
             f"header were right, all times would differ by {mean / claimed - 1:+.2%}"
