@@ -401,7 +401,7 @@ class Problem:
                         method="leastsq",
                         Dfun=lambda p: evaluate(p)[1].T,
                         col_deriv=1,
-                        ftol=1e-8,
+                        ftol=1e-7,
                         xtol=1e-9,
                         factor=1.0,
                     )
@@ -467,10 +467,11 @@ class Problem:
             if found is None:
                 return best
             negative = tuple(n for n in self.free if n in _DRAG_NAMES and n not in zero and found.values[n] < 0)
-            values = {**found.values, **dict.fromkeys(negative, 0.0)}
             zero += negative
             if negative:
+                values = self._moved_to_zero(found.values, negative, zero)
                 continue
+            values = found.values
             if best is not None and found.cost >= best.cost:
                 return best
             best = replace(found, at_zero=zero)
@@ -479,6 +480,22 @@ class Problem:
                 return best
             zero = tuple(name for name in zero if name != wanted)
         return best
+
+    def _moved_to_zero(
+        self, values: Mapping[str, float], drags: tuple[str, ...], zero: tuple[str, ...]
+    ) -> dict[str, float]:
+        """`drags` at zero and the free parameters moved along, to first order, so that the motion stays as near as can be."""
+        nothing = dict.fromkeys(drags, 0.0)
+        residual, jacobian = self._residuals(values, self.free, self.series.theta_rad, 1 / self.sigma)
+        rest = [i for i, name in enumerate(self.free) if name not in zero]
+        if not residual[0] < _BAD:
+            return {**values, **nothing}
+        own = jacobian[:, rest]
+        size = np.linalg.norm(own, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        taken = sum(jacobian[:, self.free.index(name)] * values[name] for name in drags)
+        change = np.linalg.lstsq(own / size, taken, rcond=1e-10)[0] / size
+        return {**values, **nothing, **{self.free[i]: values[self.free[i]] + float(d) for i, d in zip(rest, change)}}
 
     def _wanted(self, found: Solved, zero: tuple[str, ...]) -> str | None:
         """Which of the drags held at zero would lower the cost most if it grew, to first order; None where none would."""

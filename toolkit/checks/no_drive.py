@@ -102,16 +102,19 @@ def check(evidence: Evidence) -> Finding | None:
 
 
 def _power(t: np.ndarray, x: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Periodogram at any frequencies and times, 1 for white noise of unit variance."""
+    """Periodogram at evenly spaced frequencies and any times, 1 for white noise of unit variance."""
     step = max(1, t.size // 4000) if frequency[-1] * 8 * float(t[-1]) < t.size else 1
     if step > 1:
         count = t.size // step
         t, x = (v[: count * step].reshape(count, step).mean(axis=1) for v in (t, x))
         x = x * math.sqrt(step)
     power = np.empty(frequency.size)
-    for start in range(0, frequency.size, 64):
-        phase = np.exp(-2j * math.pi * frequency[start : start + 64, None] * t[None, :])
-        power[start : start + 64] = np.abs(phase @ x) ** 2 / t.size
+    turn = np.exp(-2j * math.pi * (frequency[1] - frequency[0]) * t)
+    for i in range(frequency.size):
+        if i % 64 == 0:  # from one frequency to the next it is one turn more; anew before rounding adds up
+            wave = np.exp(-2j * math.pi * frequency[i] * t)
+        power[i] = abs(wave @ x) ** 2 / t.size
+        wave *= turn
     return power
 
 
