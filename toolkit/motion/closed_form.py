@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.errors import UsageError
+from toolkit.motion.blocks import blocks
 from toolkit.motion.exact_arithmetic import cos_and_sin_of_product, root_of_difference_of_squares
 
 PARAMETERS = (
@@ -226,15 +227,18 @@ def _solve_underdamped(
         steady = a * complex(math.cos(psi), math.sin(psi)) / (near * far)
         theta0, omega0 = theta0 - steady.real, omega0 + omega_f * steady.imag
     across = (omega0 + alpha * theta0) / rate
-    decay, angle = np.exp(-alpha * t), rate * t
-    c, s = decay * np.cos(angle), decay * np.sin(angle)
-    theta = theta0 * c + across * s
-    omega = omega0 * c - (rate * theta0 + alpha * across) * s
-    if a:
-        angle = omega_f * t
-        c, s = np.cos(angle), np.sin(angle)
-        theta += steady.real * c - steady.imag * s
-        omega -= omega_f * (steady.real * s + steady.imag * c)
+    theta, omega = np.empty(t.size), np.empty(t.size)
+    for part in blocks(t.size):
+        now = t[part]
+        decay, angle = np.exp(-alpha * now), rate * now
+        c, s = decay * np.cos(angle), decay * np.sin(angle)
+        theta[part] = theta0 * c + across * s
+        omega[part] = omega0 * c - (rate * theta0 + alpha * across) * s
+        if a:
+            angle = omega_f * now
+            c, s = np.cos(angle), np.sin(angle)
+            theta[part] += steady.real * c - steady.imag * s
+            omega[part] -= omega_f * (steady.real * s + steady.imag * c)
     return theta, omega
 
 

@@ -11,6 +11,7 @@ import importlib.util
 import os
 import sys
 import tempfile
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -71,25 +72,38 @@ def load(name: str) -> ModuleType | None:
 
 def jet_address(module: ModuleType) -> int:
     """The address of the module's jet(q, s, W, R, n) as machine code, compiled now or found on disk."""
-    import numba
     from numba import types
 
-    pointer = types.CPointer(types.float64)
-    signature = types.void(pointer, pointer, pointer, pointer, types.int64)
-    made = numba.cfunc(signature, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})(module.jet)
-    module.__dict__["compiled_jet"] = made  # the machine code lives as long as the module
-    address: int = made.address
-    return address
+    from toolkit.motion.pointer import REALS
+
+    return _address(module, "jet", [REALS] * 4 + [types.int64], {"contract", "reassoc", "nsz"})
 
 
 def terms_address(module: ModuleType) -> int:
     """The address of the module's terms(q, s, out) as machine code, compiled now or found on disk."""
-    import numba
+    from toolkit.motion.pointer import REALS
+
+    return _address(module, "terms", [REALS] * 3)
+
+
+@cache
+def integrator(module: ModuleType) -> Callable[..., None]:
+    """integrate() of taylor, dop853 or rodas as machine code: a C function of eleven addresses after the equation's."""
+    import ctypes
+
     from numba import types
 
-    pointer = types.CPointer(types.float64)
-    signature = types.void(pointer, pointer, pointer)
-    made = numba.cfunc(signature, cache=True, error_model="numpy")(module.terms)
-    module.__dict__["compiled_terms"] = made
+    from toolkit.motion.pointer import REALS, WHOLES
+
+    address = _address(module, "integrate", [types.int64, REALS, *[WHOLES] * 3, *[REALS] * 7])
+    return ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 11)(address)
+
+
+def _address(module: ModuleType, name: str, kinds: list[object], fastmath: object = False) -> int:
+    import numba
+
+    signature = numba.void(*kinds)
+    made = numba.cfunc(signature, cache=True, error_model="numpy", fastmath=fastmath)(getattr(module, name))
+    module.__dict__[f"compiled_{name}"] = made  # the machine code lives as long as the module
     address: int = made.address
     return address

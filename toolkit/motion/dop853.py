@@ -12,193 +12,215 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from toolkit.motion import dop853_table
 from toolkit.motion.friction import held_until, leave_rest
-from toolkit.motion.pointer import call_terms
+from toolkit.motion.pointer import call_terms, skip
+from toolkit.motion.taylor import DONE, MOST_EVENTS, MOST_STEPS, NOT_FINITE, TOO_MANY_STEPS  # noqa: F401
 
-DONE, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2
-STICK, SLIP = 0, 1
+METHOD, STAGES = "Runge–Kutta DOP853", 12
+FIRST, FLOOR = 0.1, 1e-15
+
+_TABLES = ("A", "NODES", "E3", "E5", "D")
+TABLE = np.concatenate([getattr(dop853_table, name).ravel() for name in _TABLES])
+_STARTS = np.cumsum([0, *[getattr(dop853_table, name).size for name in _TABLES]]).tolist()
+_C, _E3, _E5, _D = _STARTS[1:5]
+_WIDE, _E = dop853_table.A.shape[1], dop853_table.D.shape[1]
 
 
-@njit(cache=True)
+def work_size(n_basis: int, sensitivities: int) -> int:
+    """Numbers of working memory that `integrate` needs."""
+    return 4 + n_basis + 1 + (4 + 2 * sensitivities) * (3 + 16 + 7)
+
+
+@njit
 def _slope(
-    address: int, q: Any, layout: Any, columns: Any, values: Any, s: Any, B: Any, y: Any, k: int, out: Any
+    address: int, q: Any, layout: Any, columns: Any, values: Any, s: Any, B: Any, y: Any, m: int, out: Any
 ) -> None:
     """y' for y = (θ, w, δθ₁, δw₁, …, error_θ, error_w)."""
-    s[1], s[2] = y[0], y[1]
-    call_terms(address, q.ctypes.data, s.ctypes.data, B.ctypes.data)
-    force = by_theta = by_w = 0.0
-    for e in range(layout[0], layout[1]):
-        force += values[e] * B[columns[e]]
+    s[1] = y[0]
+    s[2] = y[1]
+    call_terms(address, q, s, B)
+    by_theta = by_w = 0.0
     for e in range(layout[1], layout[2]):
-        by_theta += values[e] * B[columns[e]]
+        by_theta += values[e] * B[columns[1 + e]]
     for e in range(layout[2], layout[3]):
-        by_w += values[e] * B[columns[e]]
-    out[0], out[1] = y[1], force
-    for a in range(k + 1):
-        v = by_theta * y[2 + 2 * a] + by_w * y[3 + 2 * a]
-        if a < k:
-            for e in range(layout[4 + a], layout[5 + a]):
-                v += values[e] * B[columns[e]]
-        out[2 + 2 * a], out[3 + 2 * a] = y[3 + 2 * a], v
+        by_w += values[e] * B[columns[1 + e]]
+    for d in range(0, m, 2):
+        row = 3 + d // 2 if d > 0 else 0  # rows: F, F_θ, F_w, F_τ, sensitivities, and the error, which nothing forces
+        v = by_theta * y[d] + by_w * y[d + 1] if d > 0 else 0.0
+        for e in range(layout[row], layout[row + 1]):
+            v += values[e] * B[columns[1 + e]]
+        out[d] = y[d + 1]
+        out[d + 1] = v
 
 
-@njit(cache=True)
+@njit
 def _stages(
-    address: int, q: Any, layout: Any, columns: Any, values: Any, s: Any, B: Any, k: int, t: float, h: float,
-    y: Any, K: Any, first: int, last: int, A: Any, C: Any, z: Any,
+    address: int, q: Any, layout: Any, columns: Any, values: Any, s: Any, B: Any, m: int, t: float, h: float,
+    y: Any, K: Any, first: int, last: int, table: Any, z: Any,
 ) -> None:  # fmt: skip
     for i in range(first, last):
-        for d in range(y.size):
+        for d in range(m):
             v = 0.0
             for j in range(i):
-                v += A[i, j] * K[j, d]
+                v += table[_WIDE * i + j] * K[m * j + d]
             z[d] = y[d] + h * v
-        s[0] = t + C[i] * h
-        _slope(address, q, layout, columns, values, s, B, z, k, K[i])
+        s[0] = t + table[_C + i] * h
+        _slope(address, q, layout, columns, values, s, B, z, m, skip(K, m * i))
 
 
-@njit(cache=True)
 def integrate(
-    address: int, q: Any, n_basis: int, layout: Any, columns: Any, values: Any, switches: bool, holds: bool, timed: bool,
-    rate: float, theta: float, w: float, start: float, t: Any, tolerance: float, max_steps: int, sensitivity: Any,
-    out: Any, events: Any, A: Any, C: Any, E3: Any, E5: Any, D: Any, R: Any,
-) -> tuple[int, int, int, float]:  # fmt: skip
-    """As `taylor.integrate`, with the tables of DOP853."""
-    k, count = sensitivity.shape[0], t.size
-    m = 4 + 2 * k
-    y, z, last, fresh = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
-    K, P = np.zeros((16, m)), np.zeros((7, m))
-    B, s = np.zeros(max(n_basis, 1)), np.zeros(4)
-    row = (columns[layout[0] : layout[1]], values[layout[0] : layout[1]])
-    y[0], y[1] = theta, w
-    for a in range(k):
-        y[2 + 2 * a], y[3 + 2 * a] = sensitivity[a, 0], sensitivity[a, 1]
-    now, worst = start, 0.0
-    n_events, steps, i = 0, 0, 0
-    sign = 1.0 if w > 0.0 else -1.0
-    resting = switches and w == 0.0
-    begun = False
-    end = t[count - 1] if count > 0 else start
-    h = 0.0
-    while i < count and t[i] <= start:
-        _store(out, i, y, k)
-        i += 1
-    while i < count:
+    address: int, q: Any, sizes: Any, layout: Any, columns: Any, values: Any, numbers: Any, t: Any, out: Any, report: Any,
+    work: Any, table: Any,
+) -> None:  # fmt: skip
+    """As `taylor.integrate`; `address` of the terms, `table` the numbers of DOP853."""
+    switches = sizes[3]
+    count = sizes[7]
+    m = 4 + 2 * sizes[6]
+    tolerance = numbers[4]
+    s = work
+    B = skip(s, 4)
+    y = skip(B, sizes[0] + 1)
+    z = skip(y, m)
+    fresh = skip(z, m)
+    K = skip(fresh, m)
+    P = skip(K, 16 * m)
+    for d in range(m):
+        y[d] = numbers[3 + d] if 1 < d < m - 2 else 0.0
+    y[0] = numbers[1]
+    y[1] = numbers[2]
+    now = numbers[3]
+    h = worst = 0.0
+    found = steps = i = 0
+    sign = 1.0 if y[1] > 0.0 else -1.0
+    resting = switches != 0 and y[1] == 0.0
+    end = t[count - 1]
+    report[0] = DONE
+    held = True  # for the samples at the start itself
+    until = now
+    while report[0] == DONE:
+        if held:
+            while i < count and t[i] <= until:
+                for d in range(m - 2):
+                    out[d * count + i] = y[d]
+                i += 1
+            held = False
+        if i >= count:
+            break
+        s[0] = now
         if resting:
-            s[0], s[1], s[2] = now, y[0], 0.0
-            held, sign, ratio = leave_rest(address, False, q, s, B, R, row, holds, sign)
-            if begun:
-                for a in range(k + 1):
-                    y[3 + 2 * a] *= ratio
             resting = False
+            s[1] = y[0]
+            s[2] = 0.0
+            held, sign, ratio = leave_rest(address, False, q, s, B, table, columns, values, sizes[4], sign)
+            if steps > 0 or held:
+                for d in range(3, m, 2):
+                    y[d] *= ratio
             if held:
-                if n_events < events.shape[0]:
-                    events[n_events, 0], events[n_events, 1], events[n_events, 2] = STICK, now, y[0]
-                    n_events += 1
                 until, way = end, 0.0
-                if timed:
-                    until, way = held_until(address, False, q, s, B, R, row, rate, now, end)
-                for a in range(k + 1):
-                    y[3 + 2 * a] = 0.0
-                while i < count and t[i] <= until:
-                    _store(out, i, y, k)
-                    i += 1
-                now, h = until, 0.0
+                if sizes[5] != 0:
+                    until, way = held_until(address, False, q, s, B, table, columns, values, numbers[0], now, end)
                 if way != 0.0:
                     sign = way
-                    if n_events < events.shape[0]:
-                        events[n_events, 0], events[n_events, 1], events[n_events, 2] = SLIP, now, y[0]
-                        n_events += 1
+                for a in range(2):  # it sticks; it slips
+                    if found < MOST_EVENTS and (a == 0 or way != 0.0):
+                        event = skip(report, 4 + 3 * found)
+                        event[0] = a
+                        event[1] = now
+                        event[2] = y[0]
+                        found += 1
+                    now = until
+                h = 0.0
+                steps += 1
                 continue
-        s[0], s[3] = now, sign
-        _slope(address, q, layout, columns, values, s, B, y, k, K[0])
+        s[3] = sign
+        _slope(address, q, layout, columns, values, s, B, y, m, K)
         if h == 0.0:
-            h = min(0.1, 0.5 * tolerance ** (1.0 / 8.0) / (1e-3 + abs(K[0, 0]) + abs(K[0, 1])) + 1e-6)
-        turned = False
-        while True:
-            if steps >= max_steps:
-                return TOO_MANY_STEPS, steps, n_events, worst
+            h = min(0.1, 0.5 * tolerance ** (1.0 / 8.0) / (1e-3 + abs(K[0]) + abs(K[1])) + 1e-6)
+        error = grow = whole = low = high = 0.0
+        turning = turned = False
+        while True:  # until the step is short enough and, where w is zero inside it, ends there
+            if steps >= sizes[9]:
+                report[0] = TOO_MANY_STEPS
+                break
             steps += 1
             h = min(h, end - now)
-            _stages(address, q, layout, columns, values, s, B, k, now, h, y, K, 1, 13, A, C, z)
-            five = three = 0.0
-            for d in range(2):
-                e5 = e3 = 0.0
-                for j in range(13):
-                    e5 += E5[j] * K[j, d]
-                    e3 += E3[j] * K[j, d]
-                five += e5 * e5
-                three += e3 * e3
-            error = h * five / math.sqrt(five + 0.01 * three) if five > 0.0 else 0.0
-            if not error < 1e300:
-                h *= 0.1
-                if h < 1e-14 * (1.0 + abs(now)):
-                    return NOT_FINITE, steps, n_events, worst
-                continue
-            grow = min(6.0, 0.9 * (tolerance / error) ** 0.125) if error > 0.0 else 6.0
-            if error > tolerance and h > 1e-14 * (1.0 + abs(now)):
-                h *= max(0.2, grow)
-                continue
-            break
-        if switches and sign * z[1] < 0.0:  # w is zero inside this step: shorten it until it is zero at its end
-            low, high, whole = 0.0, h, h
-            for _ in range(100):
-                near = h - z[1] / K[12, 1] if K[12, 1] != 0.0 else -1.0
-                near = near if low < near < high else 0.5 * (low + high)
-                moved = abs(near - h)
-                h = near
-                _stages(address, q, layout, columns, values, s, B, k, now, h, y, K, 1, 13, A, C, z)
-                if sign * z[1] < 0.0:
-                    high = h
-                else:
-                    low = h
-                if z[1] == 0.0 or moved <= 2e-16 * (abs(now) + h):
+            _stages(address, q, layout, columns, values, s, B, m, now, h, y, K, 1, 13, table, z)
+            if not turning:
+                five = three = 0.0
+                for d in range(2):
+                    e5 = e3 = 0.0
+                    for j in range(13):
+                        e5 += table[_E5 + j] * K[m * j + d]
+                        e3 += table[_E3 + j] * K[m * j + d]
+                    five += e5 * e5
+                    three += e3 * e3
+                error = h * five / math.sqrt(five + 0.01 * three) if five > 0.0 else 0.0
+                if not error < 1e300:
+                    h *= 0.1
+                    if h < 1e-14 * (1.0 + abs(now)):
+                        report[0] = NOT_FINITE
+                        break
+                    continue
+                grow = min(6.0, 0.9 * (tolerance / error) ** 0.125) if error > 0.0 else 6.0
+                if error > tolerance and h > 1e-14 * (1.0 + abs(now)):
+                    h *= max(0.2, grow)
+                    continue
+                if switches == 0 or sign * z[1] >= 0.0:
                     break
-            turned = True
-            if y[1] == 0.0 and h < 1e-6 * whole:  # it leaves rest the other way
-                sign, h = -sign, whole
-                continue
-        for d in range(m):
-            last[d] = z[d]  # stage 12 is the new point
-        j = i
-        while j < count and t[j] <= now + h:
-            j += 1
-        if j > i:
-            _stages(address, q, layout, columns, values, s, B, k, now, h, y, K, 13, 16, A, C, fresh)
-            for d in range(m):
-                change = last[d] - y[d]
-                P[0, d], P[1, d] = change, h * K[0, d] - change
-                P[2, d] = 2.0 * change - h * (K[12, d] + K[0, d])
-                for r in range(4):
+                turning = turned = True
+                whole = high = h
+                low = 0.0
+            elif sign * z[1] < 0.0:
+                high = h
+            else:
+                low = h
+            near = h - z[1] / K[12 * m + 1] if K[12 * m + 1] != 0.0 else -1.0
+            if not low < near < high:
+                near = 0.5 * (low + high)
+            if z[1] == 0.0 or abs(near - h) <= 2e-16 * (abs(now) + h):
+                if y[1] == 0.0 and h < 1e-6 * whole:  # it leaves rest the other way
+                    sign = s[3] = -sign
+                    h = whole
+                    turning = turned = False
+                    s[0] = now
+                    _slope(address, q, layout, columns, values, s, B, y, m, K)
+                    continue
+                break
+            h = near
+        if report[0] != DONE:
+            break
+        if t[i] <= now + h:
+            for d in range(m):  # z, the new point, was the twelfth stage
+                change = z[d] - y[d]
+                P[d] = change
+                P[m + d] = h * K[d] - change
+                P[2 * m + d] = 2.0 * change - h * (K[12 * m + d] + K[d])
+            _stages(address, q, layout, columns, values, s, B, m, now, h, y, K, 13, 16, table, fresh)
+            for r in range(4):
+                for d in range(m):
                     v = 0.0
                     for stage in range(16):
-                        v += D[r, stage] * K[stage, d]
-                    P[3 + r, d] = h * v
-            while i < j:
-                x = (t[i] - now) / h
+                        v += table[_D + _E * r + stage] * K[m * stage + d]
+                    P[(3 + r) * m + d] = h * v
+            while i < count and t[i] <= now + h:
+                part = (t[i] - now) / h
                 for d in range(m - 2):
                     v = 0.0
                     for r in range(6, -1, -1):
-                        v = (v + P[r, d]) * (x if r % 2 == 0 else 1.0 - x)
-                    z[d] = y[d] + v
-                _store(out, i, z, k)
+                        v = (v + P[r * m + d]) * (part if r % 2 == 0 else 1.0 - part)
+                    out[d * count + i] = y[d] + v
                 i += 1
         now += h
-        begun = True
         for d in range(m):
-            y[d] = last[d]
+            y[d] = z[d]
         y[m - 2] += math.copysign(0.8 * error, y[m - 2]) + 1.1e-16 * abs(y[0])
         y[m - 1] += math.copysign(0.8 * error, y[m - 1])
         worst = max(worst, abs(y[m - 2]))
+        h *= max(grow, 0.2)
         if turned:
-            y[1] = 0.0
+            y[1] = h = 0.0
             resting = True
-        h = 0.0 if turned else h * max(grow, 0.2)
-    return DONE, steps, n_events, worst
-
-
-@njit(cache=True)
-def _store(out: Any, i: int, y: Any, k: int) -> None:
-    out[0, i], out[1, i] = y[0], y[1]
-    for a in range(k):
-        out[2 + a, i], out[2 + k + a, i] = y[2 + 2 * a], y[3 + 2 * a]
+    report[1] = steps
+    report[2] = found
+    report[3] = worst

@@ -22,6 +22,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 
 from toolkit.errors import UsageError
+from toolkit.motion.blocks import blocks
 from toolkit.motion.exact_arithmetic import two_product
 
 _PI = math.pi
@@ -67,18 +68,22 @@ def solve_pendulum(
     period, period_lost = motion.period_s, motion.period_lost
     direction = math.copysign(1.0, omega0_rad_per_s) if motion.kind == "rotation" else 1.0
     phase0 = motion.phase0
-    count = np.rint(t / period)
-    whole, whole_lost = two_product(count, period)
-    part = ((t - whole) - whole_lost - count * period_lost) / period
-    phase = phase0 + direction * part  # in periods of cn (libration) or of am, that is 2K (rotation)
-    more = np.rint(phase)
-    phase = phase - more
-    if motion.kind == "libration":
-        theta, omega = _libration(phase, motion.kappa, motion.kappa_c)
-        return PendulumSolution(theta + turns, rate * omega, "libration", period)
-    theta, omega = _rotation(phase, motion.kappa, motion.kappa_c)
-    theta = theta + 2 * _PI * (direction * count + more)
-    return PendulumSolution(theta + turns, direction * rate * omega, "rotation", period)
+    theta, omega = np.empty(t.size), np.empty(t.size)
+    for part in blocks(t.size):
+        now = t[part]
+        count = np.rint(now / period)
+        whole, whole_lost = two_product(count, period)
+        # in periods of cn (libration) or of am, that is 2K (rotation)
+        phase = phase0 + (direction / period) * ((now - whole) - whole_lost - count * period_lost)
+        more = np.rint(phase)
+        if motion.kind == "libration":
+            angle, velocity = _libration(phase - more, motion.kappa, motion.kappa_c)
+            theta[part], omega[part] = angle + turns, rate * velocity
+        else:
+            angle, velocity = _rotation(phase - more, motion.kappa, motion.kappa_c)
+            theta[part] = angle + 2 * _PI * (direction * count + more) + turns
+            omega[part] = direction * rate * velocity
+    return PendulumSolution(theta, omega, motion.kind, period)
 
 
 def pendulum_period(theta0_rad: float, omega_g_rad_per_s: float, omega0_rad_per_s: float = 0.0) -> float:

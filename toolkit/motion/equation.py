@@ -331,10 +331,11 @@ class Equation:
                 raise UsageError(
                     f"no parameter {name!r} in this equation{did_you_mean(name, [*self.parameters, *START])}"
                 )
+        rows.append([])  # of the error, which nothing forces
         for row in rows:
             start.append(start[-1] + len(row))
-        columns = np.array([c for row in rows for c in row] or [0], dtype=np.int64)
-        made = (np.array(start, dtype=np.int64), columns, take, np.array(code.JACOBIAN_LENGTHS, dtype=np.int64))
+        columns = np.array([len(rows[0]), *[c for row in rows for c in row]], dtype=np.int64)
+        made = (np.array(start, dtype=np.int64), columns, take)
         self._memory[sensitivities] = made
         return made
 
@@ -434,69 +435,91 @@ class Equation:
     ) -> Solution:  # fmt: skip
         code = self.code
         scale = 2.0 ** round(0.5 * math.log2(p[0] / p[1]))  # p: length_m, g_m_per_s2, …
-        layout, columns, take, lengths = self._layout(sensitivities)
+        layout, columns, take = self._layout(sensitivities)
         coefficients = code.coefficients(p, scale)
         entries = coefficients[code.N_INNER :]
         if take:
             partials = code.partials(p, scale)
             entries += tuple([partials[i] for i in take])
         k = len(sensitivities)
-        initial = np.zeros((k, 2))
-        for a, name in enumerate(sensitivities):
-            if name == START[0]:
-                initial[a, 0] = 1.0
-            elif name == START[1]:
-                initial[a, 1] = scale
+        numbers = [code.fastest_rate(p, scale), float(theta0), float(omega0) * scale, start_s / scale, 0.0]
+        for name in sensitivities:
+            numbers += [float(name == START[0]), scale if name == START[1] else 0.0]
         task = _Task(
-            np.array(coefficients or (0.0,)), layout, columns, np.array(entries or (0.0,)), lengths,
-            code.fastest_rate(p, scale), float(theta0), float(omega0) * scale, start_s / scale, t / scale,
-            initial, np.empty((2 + 2 * k, t.size)), np.zeros((64, 3)),
+            np.array(coefficients or (0.0,)), layout, columns, np.array(entries or (0.0,)), np.array(numbers),
+            t if scale == 1.0 else t / scale, np.empty((2 + 2 * k, t.size)),
         )  # fmt: skip
-        result = self._run_rodas(task, accuracy) if not k and self._is_stiff(task, coefficients) else None
+        result = None
+        if not k and self._is_stiff(task, coefficients):
+            from toolkit.motion import rodas
+
+            result = self._run(rodas, task, accuracy)
+            result = None if result is None or result.error > accuracy else result
         if result is None and code.ANALYTIC:
-            result = self._run_taylor(task, accuracy)
+            from toolkit.motion import taylor
+
+            result = self._run(taylor, task, accuracy)
         if result is None:
-            result = self._run_dop853(task, accuracy)
-        out, found = task.out, result.events
-        events = tuple(
-            Event(("stick", "slip")[int(e[0])], float(e[1] * scale), float(e[2])) for e in task.events[:found]
-        )
+            from toolkit.motion import dop853
+
+            result = self._run(dop853, task, accuracy)
+        if result is None:
+            raise JobError("the motion grows without bound or meets a singularity; check the effects' parameters")
+        out = task.out
+        if scale != 1.0:
+            out[1] /= scale
+            out[3::2] /= scale
+        events = tuple(Event(("stick", "slip")[int(e[0])], float(e[1] * scale), float(e[2])) for e in result.events)
         warnings: tuple[str, ...] = ()
         if result.error > accuracy:
             text = f"asked for {accuracy:.1e} rad, the estimated error is {result.error:.1e} rad: the motion amplifies rounding"
             warnings = (text,)
         return Solution(
-            t, out[0], out[1] / scale, out[2 : 2 + k].T, out[2 + k :].T / scale, result.method, result.cost,
+            t, out[0], out[1], out[2::2].T, out[3::2].T, result.method, result.cost,
             result.error, events, warnings,
         )  # fmt: skip
 
-    def _run_taylor(self, task: _Task, accuracy: float) -> _Result | None:
-        """Taylor series; None where the motion meets a point at which a term has none."""
-        from toolkit.motion import taylor
+    def _run(self, route: ModuleType, task: _Task, accuracy: float) -> _Result | None:
+        """By one route; None where that cannot hold the accuracy, or where a term has no series."""
+        from toolkit.motion import compiled, taylor
 
-        code = self.code
-        address, compile_s = self._jet
+        code, is_taylor = self.code, route is taylor
+        address, compile_s = self._jet if is_taylor else self._terms
         began = time.process_time()
-        span = float(task.tau[-1]) - task.start
-        tolerance = max(0.1 * accuracy / (1.0 + 0.3 * span), _FLOOR)
-        evaluations = steps = 0
+        integrate = compiled.integrator(route)
+        compile_s += time.process_time() - began
+        began = time.process_time()
+        k, rows = (task.numbers.size - 5) // 2, code.N_WORK if is_taylor else code.N_BASIS
+        sizes = np.array(
+            [rows, *code.JACOBIAN_LENGTHS, code.SWITCHES, code.HOLDS, code.TIMED, k, task.tau.size, 0, route.MOST_STEPS]
+        )
+        report, work = np.empty(4 + 3 * taylor.MOST_EVENTS), np.empty(route.work_size(rows, k))
+        arrays = (
+            task.q, sizes, task.layout, task.columns, task.values, task.numbers, task.tau, task.out, report, work,
+            route.TABLE,
+        )  # fmt: skip
+        places = [array.ctypes.data for array in arrays]
+        tolerance = max(route.FIRST * accuracy / (1.0 + 0.3 * float(task.tau[-1] - task.numbers[3])), route.FLOOR)
+        evaluations = total = 0
         for _attempt in range(6):
             order = min(max(int(1.5 - 0.7 * math.log(tolerance)), 6), taylor.MAX_ORDER)
-            status, taken, found, error = taylor.integrate(
-                address, task.q, code.N_WORK, task.layout, task.columns, task.values, task.lengths, code.SWITCHES,
-                code.HOLDS, code.TIMED, task.rate, task.theta, task.w, task.start, task.tau, order, tolerance, _MOST_STEPS,
-                task.initial, task.out, task.events, taylor.RECIPROCALS,
-            )  # fmt: skip
-            steps += taken
-            evaluations += taken * order
-            if status != taylor.DONE or error <= accuracy or tolerance <= _FLOOR:
+            sizes[8], task.numbers[4] = order, tolerance
+            integrate(address, *places)
+            status, steps, found, error = report[:4].tolist()
+            total += int(steps)
+            evaluations += int(steps) * (order if is_taylor else route.STAGES)
+            if status != taylor.DONE or error <= accuracy or tolerance <= route.FLOOR:
                 break
-            tolerance = max(tolerance * 0.3 * accuracy / error, _FLOOR)
-        if status == taylor.NOT_FINITE:
+            tolerance = max(tolerance * 0.3 * accuracy / error, route.FLOOR)
+        if status == taylor.TOO_MANY_STEPS and route.MOST_STEPS == taylor.MOST_STEPS:
+            raise JobError(
+                f"the equation needs more than {route.MOST_STEPS} steps; shorten the time or soften the stiffest effect"
+            )
+        if status != taylor.DONE:
             return None
-        _require_steps(status == taylor.TOO_MANY_STEPS)
-        cost = SolveCost(time.process_time() - began, compile_s, evaluations, steps)
-        return _Result(error, f"Taylor series of order {order}", cost, found)
+        cost = SolveCost(time.process_time() - began, compile_s, evaluations, total)
+        method = f"Taylor series of order {order}" if is_taylor else route.METHOD
+        return _Result(error, method, cost, report[4 : 4 + 3 * int(found)].reshape(-1, 3))
 
     def _is_stiff(self, task: _Task, entries: tuple[float, ...]) -> bool:
         """Does the velocity decay so much faster than the motion that an explicit method would crawl?"""
@@ -505,74 +528,12 @@ class Equation:
             return False
         basis = [0.0] * code.N_BASIS
         try:
-            code.terms(entries, (task.start, task.theta, max(abs(task.w), 1.0), 1.0), basis)
+            code.terms(entries, (task.numbers[3], task.numbers[1], max(abs(task.numbers[2]), 1.0), 1.0), basis)
         except ArithmeticError:  # a singularity at the start: the integrators deal with it
             return False
         first = code.N_INNER + len(code.ROWS[0]) + len(code.ROWS[1])
         decay = -sum([entries[first + i] * basis[column] for i, column in enumerate(code.ROWS[2])])
-        return decay > 30 and decay * (float(task.tau[-1]) - task.start) > 3000
-
-    def _run_rodas(self, task: _Task, accuracy: float) -> _Result | None:
-        """The L-stable method; None where it cannot hold the accuracy."""
-        from toolkit.motion import rodas
-
-        code = self.code
-        address, compile_s = self._terms
-        began = time.process_time()
-        tolerance = 0.03 * accuracy
-        steps = 0
-        for _attempt in range(4):
-            status, taken, error = rodas.integrate(
-                address, task.q, code.N_BASIS, task.layout, task.columns, task.values, task.theta, task.w, task.start,
-                task.tau, tolerance, 200_000, task.out,
-            )  # fmt: skip
-            steps += taken
-            if status != rodas.DONE:
-                return None
-            if error <= accuracy:
-                break
-            tolerance *= 0.3 * accuracy / error
-        else:
-            return None
-        cost = SolveCost(time.process_time() - began, compile_s, 7 * steps, steps)
-        return _Result(error, "Rodas4, L-stable", cost, 0)
-
-    def _run_dop853(self, task: _Task, accuracy: float) -> _Result:
-        """Runge–Kutta of order 8."""
-        from toolkit.motion import dop853, dop853_table, taylor
-
-        code = self.code
-        address, compile_s = self._terms
-        began = time.process_time()
-        span = float(task.tau[-1]) - task.start
-        tolerance = max(0.1 * accuracy / (1.0 + 0.3 * span), _RK_FLOOR)
-        steps = 0
-        for _attempt in range(6):
-            status, taken, found, error = dop853.integrate(
-                address, task.q, code.N_BASIS, task.layout, task.columns, task.values, code.SWITCHES, code.HOLDS,
-                code.TIMED, task.rate, task.theta, task.w, task.start, task.tau, tolerance, _MOST_STEPS, task.initial,
-                task.out, task.events, dop853_table.A, dop853_table.NODES, dop853_table.E3, dop853_table.E5,
-                dop853_table.D, taylor.RECIPROCALS,
-            )  # fmt: skip
-            steps += taken
-            if status != dop853.DONE or error <= accuracy or tolerance <= _RK_FLOOR:
-                break
-            tolerance = max(tolerance * 0.3 * accuracy / error, _RK_FLOOR)
-        if status == dop853.NOT_FINITE:
-            raise JobError("the motion grows without bound or meets a singularity; check the effects' parameters")
-        _require_steps(status == dop853.TOO_MANY_STEPS)
-        cost = SolveCost(time.process_time() - began, compile_s, 12 * steps, steps)
-        return _Result(error, "Runge–Kutta DOP853", cost, found)
-
-
-_FLOOR, _RK_FLOOR, _MOST_STEPS = 1e-17, 1e-15, 20_000_000
-
-
-def _require_steps(too_many: bool) -> None:
-    if too_many:
-        raise JobError(
-            f"the equation needs more than {_MOST_STEPS} steps; shorten the time or soften the stiffest effect"
-        )
+        return decay > 30 and decay * (float(task.tau[-1]) - task.numbers[3]) > 3000
 
 
 @dataclass(frozen=True)
@@ -583,15 +544,9 @@ class _Task:
     layout: np.ndarray
     columns: np.ndarray
     values: np.ndarray
-    lengths: np.ndarray
-    rate: float
-    theta: float
-    w: float
-    start: float
+    numbers: np.ndarray  # rate, θ, w, start, tolerance, and δθ, δw of each sensitivity at the start
     tau: np.ndarray
-    initial: np.ndarray
     out: np.ndarray
-    events: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -599,7 +554,7 @@ class _Result:
     error: float
     method: str
     cost: SolveCost
-    events: int
+    events: np.ndarray  # (m, 3): kind, τ, θ
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Calls from compiled code through an address, so that one compiled integrator serves every equation."""
+"""Plain pointers in compiled code: no bounds, no shapes, no reference counts, and therefore quick to compile.
+
+Also calls through an address, so that one compiled integrator serves every equation.
+"""
 
 from __future__ import annotations
 
@@ -8,28 +11,31 @@ from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.extending import intrinsic
 
-_REAL = ir.DoubleType()
-_INTEGER = ir.IntType(64)
+REALS, WHOLES = types.CPointer(types.float64), types.CPointer(types.int64)
 
 
-def _call(context: Any, builder: Any, values: Any, pointers: int) -> Any:
+@intrinsic
+def skip(typing: Any, pointer: Any, count: Any) -> Any:
+    """The pointer `count` elements further on."""
+    return pointer(pointer, types.int64), lambda context, builder, _, values: builder.gep(values[0], [values[1]])
+
+
+def _call(builder: Any, values: Any) -> Any:
     address, *rest = values
-    kinds = [_REAL.as_pointer()] * pointers + [_INTEGER] * (len(rest) - pointers)
-    function = ir.FunctionType(ir.VoidType(), kinds)
-    arguments = [builder.inttoptr(v, k) if i < pointers else v for i, (v, k) in enumerate(zip(rest, kinds))]
-    builder.call(builder.inttoptr(address, function.as_pointer()), arguments)
-    return context.get_dummy_value()
+    function = ir.FunctionType(ir.VoidType(), [v.type for v in rest])
+    builder.call(builder.inttoptr(address, function.as_pointer()), rest)
+    return ir.Constant(ir.IntType(8).as_pointer(), None)
 
 
 @intrinsic
 def call_jet(typing: Any, address: Any, q: Any, s: Any, work: Any, reciprocals: Any, order: Any) -> Any:
-    """Call jet(q, s, W, R, n) at `address`; the arrays are given as addresses."""
-    signature = types.void(*[types.int64] * 6)
-    return signature, lambda context, builder, _, values: _call(context, builder, values, 4)
+    """Call jet(q, s, W, R, n) at `address`."""
+    signature = types.void(types.int64, REALS, REALS, REALS, REALS, types.int64)
+    return signature, lambda context, builder, _, values: _call(builder, values)
 
 
 @intrinsic
 def call_terms(typing: Any, address: Any, q: Any, s: Any, out: Any) -> Any:
-    """Call terms(q, s, out) at `address`; the arrays are given as addresses."""
-    signature = types.void(*[types.int64] * 4)
-    return signature, lambda context, builder, _, values: _call(context, builder, values, 3)
+    """Call terms(q, s, out) at `address`."""
+    signature = types.void(types.int64, REALS, REALS, REALS)
+    return signature, lambda context, builder, _, values: _call(builder, values)

@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from toolkit.motion.pointer import call_terms
+from toolkit.motion.pointer import call_terms, skip
+from toolkit.motion.taylor import DONE, NOT_FINITE, TOO_MANY_STEPS
 
-DONE, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2
+METHOD, STAGES = "Rodas4, L-stable", 7
+FIRST, FLOOR = 0.03, 1e-15
+MOST_STEPS = 200_000
 
 # fmt: off
 GAMMA = 0.25
@@ -40,81 +43,112 @@ H3 = np.array([-0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.767
 # fmt: on
 
 
-@njit(cache=True)
+TABLE = np.concatenate([a.ravel() for a in (A, C, NODES, SLOPES, H2, H3)])
+
+
+def work_size(n_basis: int, sensitivities: int) -> int:
+    """Numbers of working memory that `integrate` needs."""
+    return 4 + 12 + n_basis + 1
+
+
+@njit
 def _row(layout: Any, columns: Any, values: Any, B: Any, row: int) -> float:
     total = 0.0
     for e in range(layout[row], layout[row + 1]):
-        total += values[e] * B[columns[e]]
+        total += values[e] * B[columns[1 + e]]
     return total
 
 
-@njit(cache=True)
 def integrate(
-    address: int, q: Any, n_basis: int, layout: Any, columns: Any, values: Any, theta: float, w: float, start: float,
-    t: Any, tolerance: float, max_steps: int, out: Any,
-) -> tuple[int, int, float]:  # fmt: skip
-    """Fill `out` (2, n) at the scaled times t. Returns status, steps, estimated error of θ."""
-    B, s = np.zeros(max(n_basis, 1)), np.zeros(4)
-    U = np.zeros((6, 2))
-    now, steps, i, count = start, 0, 0, t.size
-    end, total = t[count - 1], 0.0
-    h = 1e-3 * min(1.0, end - start)
-    while i < count and t[i] <= start:
-        out[0, i], out[1, i] = theta, w
+    address: int, q: Any, sizes: Any, layout: Any, columns: Any, values: Any, numbers: Any, t: Any, out: Any, report: Any,
+    work: Any, table: Any,
+) -> None:  # fmt: skip
+    """As `taylor.integrate`, without sensitivities and turning points; `address` of the terms, `table` Rodas4's numbers."""
+    count = sizes[7]
+    tolerance = numbers[4]
+    s = work
+    U = skip(s, 4)  # six stages of (θ, w)
+    B = skip(U, 12)
+    C_, NODES_, SLOPES_ = skip(table, 30), skip(table, 60), skip(table, 66)
+    H2_, H3_ = skip(table, 72), skip(table, 77)
+    theta = numbers[1]
+    w = numbers[2]
+    now = numbers[3]
+    end = t[count - 1]
+    total = 0.0
+    steps = i = 0
+    h = 1e-3 * min(1.0, end - now)
+    report[0] = DONE
+    while i < count and t[i] <= now:
+        out[i] = theta
+        out[count + i] = w
         i += 1
     while i < count:
-        if steps >= max_steps:
-            return TOO_MANY_STEPS, steps, total
+        if steps >= sizes[9]:
+            report[0] = TOO_MANY_STEPS
+            break
         steps += 1
         h = min(h, end - now)
-        s[0], s[1], s[2], s[3] = now, theta, w, 1.0 if w > 0.0 else -1.0
-        call_terms(address, q.ctypes.data, s.ctypes.data, B.ctypes.data)
-        by_theta, by_w, by_t = (
-            _row(layout, columns, values, B, 1),
-            _row(layout, columns, values, B, 2),
-            _row(layout, columns, values, B, 3),
-        )
+        s[0] = now
+        s[1] = theta
+        s[2] = w
+        s[3] = 1.0 if w > 0.0 else -1.0
+        call_terms(address, q, s, B)
+        by_theta = _row(layout, columns, values, B, 1)
+        by_w = _row(layout, columns, values, B, 2)
+        by_t = _row(layout, columns, values, B, 3)
         g = 1.0 / (h * GAMMA)
         determinant = g * (g - by_w) - by_theta
         x = y = 0.0
         for stage in range(6):
-            x, y = theta, w
+            x = theta
+            y = w
             r0 = r1 = 0.0
             for j in range(stage):
-                x += A[stage, j] * U[j, 0]
-                y += A[stage, j] * U[j, 1]
-                r0 += C[stage, j] * U[j, 0]
-                r1 += C[stage, j] * U[j, 1]
-            s[0], s[1], s[2], s[3] = now + NODES[stage] * h, x, y, 1.0 if y > 0.0 else -1.0
-            call_terms(address, q.ctypes.data, s.ctypes.data, B.ctypes.data)
+                a, c = table[5 * stage + j], C_[5 * stage + j]
+                u, v = U[2 * j], U[2 * j + 1]
+                x += a * u
+                y += a * v
+                r0 += c * u
+                r1 += c * v
+            s[0] = now + NODES_[stage] * h
+            s[1] = x
+            s[2] = y
+            s[3] = 1.0 if y > 0.0 else -1.0
+            call_terms(address, q, s, B)
             r0 = y + r0 / h
-            r1 = _row(layout, columns, values, B, 0) + r1 / h + SLOPES[stage] * h * by_t
-            U[stage, 0] = ((g - by_w) * r0 + r1) / determinant
-            U[stage, 1] = (by_theta * r0 + g * r1) / determinant
-        error = max(abs(U[5, 0]), abs(U[5, 1]) / (1.0 + abs(by_w)))
+            r1 = _row(layout, columns, values, B, 0) + r1 / h + SLOPES_[stage] * h * by_t
+            U[2 * stage] = ((g - by_w) * r0 + r1) / determinant
+            U[2 * stage + 1] = (by_theta * r0 + g * r1) / determinant
+        error = max(abs(U[10]), abs(U[11]) / (1.0 + abs(by_w)))
         if not error < 1e300:
             h *= 0.1
             if h < 1e-14 * (1.0 + abs(now)):
-                return NOT_FINITE, steps, total
+                report[0] = NOT_FINITE
+                break
             continue
         grow = min(6.0, max(0.2, 0.9 * (tolerance / error) ** 0.25)) if error > 0.0 else 6.0
         if error > tolerance and h > 1e-14 * (1.0 + abs(now)):
             h *= grow
             continue
-        x, y = x + U[5, 0], y + U[5, 1]
+        x += U[10]
+        y += U[11]
         k20 = k21 = k30 = k31 = 0.0
         for j in range(5):
-            k20 += H2[j] * U[j, 0]
-            k21 += H2[j] * U[j, 1]
-            k30 += H3[j] * U[j, 0]
-            k31 += H3[j] * U[j, 1]
+            k20 += H2_[j] * U[2 * j]
+            k21 += H2_[j] * U[2 * j + 1]
+            k30 += H3_[j] * U[2 * j]
+            k31 += H3_[j] * U[2 * j + 1]
         while i < count and t[i] <= now + h:
             p = (t[i] - now) / h
-            out[0, i] = theta * (1.0 - p) + p * (x + (1.0 - p) * (k20 + p * k30))
-            out[1, i] = w * (1.0 - p) + p * (y + (1.0 - p) * (k21 + p * k31))
+            out[i] = theta * (1.0 - p) + p * (x + (1.0 - p) * (k20 + p * k30))
+            out[count + i] = w * (1.0 - p) + p * (y + (1.0 - p) * (k21 + p * k31))
             i += 1
         now += h
-        theta, w = x, y
-        total += abs(U[5, 0])
+        theta = x
+        w = y
+        total += abs(U[10])
         h *= grow
-    return DONE, steps, total
+    report[1] = steps
+    report[2] = 0.0
+    report[3] = total

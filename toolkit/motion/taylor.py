@@ -5,6 +5,8 @@ samples inside it off the polynomial, and carries along, by the linear variation
 for and the global error (each step adds its own). Where the equation depends on the sign of w, the turning point is
 found to machine precision and the series starts again there; friction that can hold the pendulum holds it.
 Time and state are summed with compensation, so these functions must not be compiled with fastmath.
+
+The functions work on plain pointers: with NumPy arrays the first compilation takes three times as long.
 """
 
 from __future__ import annotations
@@ -17,88 +19,83 @@ from numba import njit
 
 from toolkit.motion.friction import held_until, leave_rest
 from toolkit.motion.generate import ROW
-from toolkit.motion.pointer import call_jet
+from toolkit.motion.pointer import call_jet, skip
 
 DONE, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2
-STICK, SLIP = 0, 1
 MAX_ORDER = ROW - 2
+MOST_STEPS = 20_000_000
+FIRST, FLOOR = 0.1, 1e-17  # first tolerance per accuracy asked for; the least
 SAFETY = 2.5  # the plain estimate has been up to 2.7 times too small (benchmarks/integrators.py accuracy)
-RECIPROCALS = np.array([0.0] + [1.0 / k for k in range(1, ROW + 1)])
+TABLE = np.array([0.0] + [1.0 / k for k in range(1, ROW + 1)])
+_BLOCK = 256  # samples at a time: they stay in the fastest cache
 
 
-@njit(cache=True, fastmath={"contract"})
-def _polynomial(c: Any, at: int, n: int, x: float) -> float:
-    v = c[at + n]
+@njit(fastmath={"contract"})
+def _value(c: Any, n: int, x: float) -> float:
+    v = c[n]
     for k in range(n - 1, -1, -1):
-        v = v * x + c[at + k]
+        v = v * x + c[k]
     return v
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _slope(c: Any, n: int, x: float) -> float:
-    """The slope of w's polynomial."""
-    v = n * c[ROW + n]
+    v = n * c[n]
     for k in range(n - 1, 0, -1):
-        v = v * x + k * c[ROW + k]
+        v = v * x + k * c[k]
     return v
 
 
-@njit(cache=True, fastmath={"contract"})
-def _above_first(c: Any, at: int, n: int, x: float) -> float:
-    """The polynomial without its constant term."""
-    v = c[at + n]
-    for k in range(n - 1, 0, -1):
-        v = v * x + c[at + k]
-    return v * x
-
-
-@njit(cache=True, fastmath={"contract"})
-def _sample(c: Any, at: int, n: int, x: Any, count: int, out: Any, first: int) -> None:
-    """Values of one series at x[0] … x[count − 1] into out[first] …; the inner loop runs over samples, side by side."""
+@njit(fastmath={"contract"})
+def _sample(c: Any, n: int, x: Any, count: int, out: Any) -> None:
+    """Values of one series at x[0] … x[count − 1]; the inner loops run over samples, side by side."""
+    top, k = c[n], n
     for j in range(count):
-        out[first + j] = c[at + n]
-    for k in range(n - 1, -1, -1):
-        a = c[at + k]
+        out[j] = top
+    while k >= 4:
+        a, b, d, e = c[k - 1], c[k - 2], c[k - 3], c[k - 4]
         for j in range(count):
-            out[first + j] = out[first + j] * x[j] + a
+            y = x[j]
+            out[j] = (((out[j] * y + a) * y + b) * y + d) * y + e
+        k -= 4
+    while k >= 1:
+        a = c[k - 1]
+        for j in range(count):
+            out[j] = out[j] * x[j] + a
+        k -= 1
 
 
-@njit(cache=True)
-def _turning_point(W: Any, n: int, h: float, sign: float) -> tuple[float, bool]:
+@njit
+def _turning_point(w: Any, n: int, h: float, sign: float) -> tuple[float, bool]:
     """The first x in (0, h] where sign·w(x) falls below 0 (or −1), and whether w is against `sign` from the start."""
-    rest = 0.0
-    power = 1.0
+    rest, power = 0.0, 1.0
     for k in range(2, n + 1):
         power *= h
-        rest += abs(W[ROW + k]) * power
-    if abs(W[ROW]) > (abs(W[ROW + 1]) + rest) * h:
+        rest += abs(w[k]) * power
+    if abs(w[0]) > (abs(w[1]) + rest) * h:
         return -1.0, False
-    if W[ROW] == 0.0 and abs(W[ROW + 1]) > rest:  # leaves rest and does not come back
-        return -1.0, sign * W[ROW + 1] < 0.0
+    if w[0] == 0.0 and abs(w[1]) > rest:  # leaves rest and does not come back
+        return -1.0, sign * w[1] < 0.0
     left = 0.0
-    parts = 6
-    for i in range(1, parts + 1):
-        right = h * i / parts
-        if sign * _polynomial(W, ROW, n, right) < 0.0:
-            if left == 0.0 and W[ROW] == 0.0:
+    for i in range(1, 7):
+        right = h * i / 6.0
+        if sign * _value(w, n, right) < 0.0:
+            if left == 0.0 and w[0] == 0.0:
                 # leaving a turning point: the motion is against the sign, or turns again within this part
                 left = right * 1e-3
-                if sign * _polynomial(W, ROW, n, left) < 0.0:
+                if sign * _value(w, n, left) < 0.0:
                     return -1.0, True
-            return _root(W, n, left, right, sign), False
+            return _root(w, n, left, right, sign), False
         left = right
     return -1.0, False
 
 
-@njit(cache=True)
-def _root(W: Any, n: int, left: float, right: float, sign: float) -> float:
+@njit
+def _root(w: Any, n: int, left: float, right: float, sign: float) -> float:
     """The zero of w in a bracket, to the last digit: Newton's steps, halving where they leave the bracket."""
     x = 0.5 * (left + right)
     for _ in range(100):
-        value, slope = W[ROW + n], 0.0
-        for k in range(n - 1, -1, -1):
-            slope = slope * x + value
-            value = value * x + W[ROW + k]
+        value, slope = _value(w, n, x), _slope(w, n, x)
         if sign * value < 0.0:
             right = x
         else:
@@ -114,217 +111,212 @@ def _root(W: Any, n: int, left: float, right: float, sign: float) -> float:
     return x
 
 
-@njit(cache=True, fastmath={"contract"})
-def _combine(W: Any, columns: Any, values: Any, first: int, last: int, n: int, out: Any, at: int) -> None:
+@njit(fastmath={"contract"})
+def _combine(W: Any, columns: Any, values: Any, first: int, last: int, n: int, out: Any) -> None:
     """A row of the coefficient matrix times the basis series."""
     for k in range(n):
-        out[at + k] = 0.0
+        out[k] = 0.0
     for e in range(first, last):
-        row = (3 + columns[e]) * ROW
+        row = skip(W, (3 + columns[e]) * ROW)
         v = values[e]
         for k in range(n):
-            out[at + k] += v * W[row + k]
+            out[k] += v * row[k]
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def _variational(J: Any, lengths: Any, D: Any, at: int, F: Any, f_at: int, forced: bool, n: int, R: Any) -> None:
-    """Series of one sensitivity: δθ' = δw, δw' = F_θ δθ + F_w δw + F_p. Rows of D: δθ at `at`, δw one row on."""
+@njit(fastmath={"contract", "reassoc", "nsz"})
+def _variational(J: Any, by_theta: int, by_w: int, D: Any, F: Any, n: int, R: Any) -> None:
+    """Series of one sensitivity: δθ' = δw, δw' = F_θ δθ + F_w δw + F_p. D: the rows of δθ and δw.
+
+    by_theta, by_w : length of the series of F_θ and F_w: 0 absent, 1 constant, 2 full.
+    """
+    K, E = skip(J, ROW), skip(D, ROW)
     for k in range(n):
-        v = u = 0.0
-        if lengths[0] == 2:
+        v, u = F[k], 0.0
+        if by_theta == 2:
             for j in range(k + 1):
-                v += J[j] * D[at + k - j]
-        elif lengths[0] == 1:
-            v = J[0] * D[at + k]
-        if lengths[1] == 2:
+                v += J[j] * D[k - j]
+        elif by_theta == 1:
+            v += J[0] * D[k]
+        if by_w == 2:
             for j in range(k + 1):
-                u += J[ROW + j] * D[at + ROW + k - j]
-        elif lengths[1] == 1:
-            u = J[ROW] * D[at + ROW + k]
-        v += u
-        if forced:
-            v += F[f_at + k]
-        D[at + k + 1] = D[at + ROW + k] * R[k + 1]
-        D[at + ROW + k + 1] = v * R[k + 1]
+                u += K[j] * E[k - j]
+        elif by_w == 1:
+            u = K[0] * E[k]
+        D[k + 1] = E[k] * R[k + 1]
+        E[k + 1] = (v + u) * R[k + 1]
 
 
-@njit(cache=True)
+MOST_EVENTS = 64
+"""Kept in `report`, which holds status, steps, events found, largest error, then (kind, τ, θ) of each event."""
+
+
+def work_size(n_work: int, sensitivities: int) -> int:
+    """Numbers of working memory that `integrate` needs."""
+    return n_work * ROW + 2 * ROW + 2 * (sensitivities + 1) * ROW + ROW + _BLOCK + 6
+
+
 def integrate(
-    address: int,
-    q: Any,
-    n_work: int,
-    layout: Any,  # (rows + 1,) where each matrix row starts in columns/values; rows: F, F_θ, F_w, F_τ, sensitivities
+    address: int,  # of the equation's jet
+    q: Any,  # inner constants, then the coefficients of F
+    sizes: Any,  # rows of the jet's memory, lengths of F_θ and F_w, switches, holds, timed, sensitivities, samples, order, most steps
+    layout: Any,  # where each matrix row starts in columns/values; rows: F, F_θ, F_w, F_τ, sensitivities
     columns: Any,
     values: Any,
-    lengths: Any,
-    switches: bool,
-    holds: bool,
-    timed: bool,
-    rate: float,
-    theta: float,
-    w: float,
-    start: float,
+    numbers: Any,  # rate, θ, w, start, tolerance, then δθ, δw of each sensitivity at the start
     t: Any,
-    order: int,
-    tolerance: float,
-    max_steps: int,
-    sensitivity: Any,  # (k, 2) δθ, δw at the start
-    out: Any,  # (2 + 2k, n): θ, w, δθ …, δw …
-    events: Any,  # (m, 3): kind, τ, θ
+    out: Any,  # (2 + 2k, n): θ, w, then δθ, δw of each sensitivity
+    report: Any,
+    work: Any,
     R: Any,
-) -> tuple[int, int, int, float]:
-    """Fill `out` at the scaled times t ≥ start. Returns status, steps, events found, largest global error of θ."""
-    n, count, k_sens = order, t.size, sensitivity.shape[0]
-    W = np.zeros(n_work * ROW)
-    J = np.zeros(2 * ROW)
-    D = np.zeros((2 * (k_sens + 1)) * ROW)
-    F, x = np.zeros(ROW), np.zeros(256)
-    s = np.zeros(4)
-    hi, lo = start, 0.0
-    theta_lo, w_lo = 0.0, 0.0
-    error_theta, error_w, worst = 0.0, 0.0, 0.0
-    n_events, steps, i = 0, 0, 0
-    passed, slope, counted = 0.0, 0.0, 0.0
-    sign = 1.0 if w > 0.0 else -1.0
-    resting = switches and w == 0.0
-    row = (columns[layout[0] : layout[1]], values[layout[0] : layout[1]])
+) -> None:
+    """Fill `out` at the scaled times t ≥ start, and `report`."""
+    by_theta = sizes[1]
+    by_w = sizes[2]
+    switches = sizes[3]
+    holds = sizes[4]
+    timed = sizes[5]
+    k_sens = sizes[6]
+    count = sizes[7]
+    n = sizes[8]
+    tolerance = numbers[4]
+    s = work  # the present time, θ, w and its sign
+    lost = skip(work, 4)  # what the last sums of θ and w lost
+    x = skip(lost, 2)
+    F = skip(x, _BLOCK)
+    J = skip(F, ROW)
+    D = skip(J, 2 * ROW)  # rows: δθ, δw of each sensitivity, then error of θ, of w
+    error = skip(D, 2 * k_sens * ROW)
+    W = skip(error, 2 * ROW)
+    w_row = skip(W, ROW)
+    for a in range(2 * k_sens):
+        D[a * ROW] = numbers[5 + a]
+    error[0] = error[ROW] = lost[0] = lost[1] = 0.0
+    s[1] = numbers[1]
+    s[2] = numbers[2]
+    hi = numbers[3]
+    lo = worst = passed = slope = counted = 0.0
+    steps = i = found = 0
     seed = 1
-    for a in range(k_sens):
-        D[2 * a * ROW] = sensitivity[a, 0]
-        D[(2 * a + 1) * ROW] = sensitivity[a, 1]
-    end = t[count - 1] if count > 0 else start
-    while i < count and t[i] <= start:
-        out[0, i] = theta
-        out[1, i] = w
-        for a in range(k_sens):
-            out[2 + a, i] = D[2 * a * ROW]
-            out[2 + k_sens + a, i] = D[(2 * a + 1) * ROW]
-        i += 1
-    while i < count:
-        if steps >= max_steps:
-            return TOO_MANY_STEPS, steps, n_events, worst
-        s[0], s[1], s[2] = hi + lo, theta, w
+    sign = 1.0 if s[2] > 0.0 else -1.0
+    resting = switches != 0 and s[2] == 0.0
+    rough = n if n < 8 else 8  # terms: the error need not be known to many digits
+    end = t[count - 1]
+    report[0] = DONE
+    held = True  # for the samples at the start itself
+    until = hi
+    while True:
+        if held:
+            while i < count and t[i] <= until:
+                for a in range(2 + 2 * k_sens):
+                    out[a * count + i] = s[1 + a] if a < 2 else D[(a - 2) * ROW]
+                i += 1
+            held = False
+        if i >= count:
+            break
+        if steps >= sizes[9]:
+            report[0] = TOO_MANY_STEPS
+            break
+        s[0] = hi + lo
         if resting:
-            held, sign, ratio = leave_rest(address, True, q, s, W, R, row, holds, sign)
-            if steps > 0:  # δw jumps by the ratio of the accelerations
-                for a in range(k_sens):
-                    D[(2 * a + 1) * ROW] *= ratio
-                error_w *= ratio
             resting = False
+            held, sign, ratio = leave_rest(address, True, q, s, W, R, columns, values, holds, sign)
+            if steps > 0 or held:  # δw jumps by the ratio of the accelerations, which is 0 where it sticks
+                for a in range(k_sens + 1):
+                    D[(2 * a + 1) * ROW] *= ratio
             if held:
-                if n_events < events.shape[0]:
-                    events[n_events, 0], events[n_events, 1], events[n_events, 2] = STICK, hi + lo, theta
-                    n_events += 1
                 until, way = end, 0.0
-                if timed:
-                    until, way = held_until(address, True, q, s, W, R, row, rate, hi + lo, end)
-                while i < count and t[i] <= until:
-                    out[0, i] = theta
-                    out[1, i] = 0.0
-                    for a in range(k_sens):
-                        out[2 + a, i] = D[2 * a * ROW]
-                        out[2 + k_sens + a, i] = 0.0
-                    i += 1
-                for a in range(k_sens):
-                    D[(2 * a + 1) * ROW] = 0.0
-                error_w = 0.0
-                hi, lo = until, 0.0
-                steps += 1
+                if timed != 0:
+                    until, way = held_until(address, True, q, s, W, R, columns, values, numbers[0], hi + lo, end)
                 if way != 0.0:
                     sign = way
-                    if n_events < events.shape[0]:
-                        events[n_events, 0], events[n_events, 1], events[n_events, 2] = SLIP, until, theta
-                        n_events += 1
+                s[3] = hi + lo
+                for a in range(2):  # it sticks; it slips
+                    if found < MOST_EVENTS and (a == 0 or way != 0.0):
+                        event = skip(report, 4 + 3 * found)
+                        event[0] = a
+                        event[1] = s[3]
+                        event[2] = s[1]
+                        found += 1
+                    s[3] = until
+                hi = until
+                lo = 0.0
+                steps += 1
                 continue
-        s[0], s[3] = hi + lo, sign
-        call_jet(address, q.ctypes.data, s.ctypes.data, W.ctypes.data, R.ctypes.data, n)
+        s[3] = sign
+        call_jet(address, q, s, W, R, n)
         steps += 1
         if passed > 0.0:  # what the last step's series lacked at its end
-            missing = max(SAFETY * passed * abs(W[2 * ROW] - slope) / (n + 1) - counted, 0.0)
-            error_theta += math.copysign(passed * missing / (n + 2), error_theta)
-            error_w += math.copysign(missing, error_w)
-            worst = max(worst, abs(error_theta))
-        last = max(abs(W[n]), abs(W[ROW + n]))
-        previous = max(abs(W[n - 1]), abs(W[ROW + n - 1]))
+            missing = SAFETY * passed * abs(W[2 * ROW] - slope) / (n + 1) - counted
+            if missing > 0.0:
+                error[0] += math.copysign(passed * missing / (n + 2), error[0])
+                error[ROW] += math.copysign(missing, error[ROW])
+                worst = max(worst, abs(error[0]))
         h = end - hi - lo
-        if last > 0.0 or previous > 0.0:
-            reach = math.log(tolerance / last) / n if last > 0.0 else 1e300
-            if previous > 0.0:
-                reach = min(reach, math.log(tolerance / previous) / (n - 1))
-            h = min(h, math.exp(reach))
+        for k in range(n - 1, n + 1):
+            last = max(abs(W[k]), abs(w_row[k]))
+            if last > 0.0:
+                h = min(h, math.exp(math.log(tolerance / last) / k))
         if not (h > 0.0 and h < 1e300):
-            return NOT_FINITE, steps, n_events, worst
+            report[0] = NOT_FINITE
+            break
         turned = False
-        if switches:
-            root, against = _turning_point(W, n, h, sign)
+        if switches != 0:
+            root, against = _turning_point(w_row, n, h, sign)
             if against:
-                sign = -sign
-                s[3] = sign
-                call_jet(address, q.ctypes.data, s.ctypes.data, W.ctypes.data, R.ctypes.data, n)
-                root, against = _turning_point(W, n, h, sign)
+                sign = s[3] = -sign
+                call_jet(address, q, s, W, R, n)
+                root, against = _turning_point(w_row, n, h, sign)
             if root >= 0.0:
-                h, turned = root, True
-        terms = n if k_sens > 0 else min(n, 8)
-        _combine(W, columns, values, layout[1], layout[2], terms if lengths[0] == 2 else 1, J, 0)
-        _combine(W, columns, values, layout[2], layout[3], terms if lengths[1] == 2 else 1, J, ROW)
-        for a in range(k_sens):
-            forced = layout[5 + a] > layout[4 + a]
-            if forced:
-                _combine(W, columns, values, layout[4 + a], layout[5 + a], n, F, 0)
-            _variational(J, lengths, D, 2 * a * ROW, F, 0, forced, n, R)
-        at = 2 * k_sens * ROW
-        D[at], D[at + ROW] = error_theta, error_w
-        rough = min(n, 8)  # terms: the error need not be known to many digits
-        _variational(J, lengths, D, at, F, 0, False, rough, R)
-        # samples inside this step
-        j = i
-        reach = hi + lo + h
-        while j < count and (t[j] <= reach or (t[j] - hi) - lo <= h):
-            j += 1
-        if j > i:
-            while i < j:
-                some = min(j - i, x.size)
-                for m in range(some):
-                    x[m] = (t[i + m] - hi) - lo
-                _sample(W, 0, n, x, some, out[0], i)
-                _sample(W, ROW, n, x, some, out[1], i)
-                for a in range(k_sens):
-                    _sample(D, 2 * a * ROW, n, x, some, out[2 + a], i)
-                    _sample(D, (2 * a + 1) * ROW, n, x, some, out[2 + k_sens + a], i)
-                i += some
+                h = root
+                turned = True
+        for a in range(2):  # F_θ, F_w
+            length = (n if k_sens > 0 else rough) if sizes[1 + a] == 2 else 1
+            _combine(W, skip(columns, 1), values, layout[1 + a], layout[2 + a], length, skip(J, a * ROW))
+        for a in range(k_sens + 1):  # the last one is the error, which nothing forces
+            length = n if a < k_sens else rough
+            _combine(W, skip(columns, 1), values, layout[4 + a], layout[5 + a], length, F)
+            _variational(J, by_theta, by_w, skip(D, 2 * a * ROW), F, length, R)
+        while i < count:  # samples inside this step
+            some = 0
+            while some < _BLOCK and i + some < count and (t[i + some] - hi) - lo <= h:
+                x[some] = (t[i + some] - hi) - lo
+                some += 1
+            if some == 0:
+                break
+            for a in range(2 + 2 * k_sens):
+                series = skip(W, a * ROW) if a < 2 else skip(D, (a - 2) * ROW)
+                _sample(series, n, x, some, skip(out, a * count + i))
+            i += some
         # the next state, with what the last sums lost
-        change = _above_first(W, 0, n, h) + theta_lo
-        new = theta + change
-        theta_lo = change - (new - theta)
-        theta = new
-        change = _above_first(W, ROW, n, h) + w_lo
-        new = w + change
-        w_lo = change - (new - w)
-        w = new
         change = h + lo
         new = hi + change
         lo = change - (new - hi)
         hi = new
-        for a in range(2 * k_sens):
-            D[a * ROW] = _polynomial(D, a * ROW, n, h)
-        error_theta = _polynomial(D, at, rough, h)
-        error_w = _polynomial(D, at + ROW, rough, h)
-        power = h ** (n - 1)
+        for a in range(2 * k_sens + 2):
+            D[a * ROW] = _value(skip(D, a * ROW), n if a < 2 * k_sens else rough, h)
+        power = 0.3 * SAFETY * h ** (n - 1)
         seed = (seed * 1103515245 + 12345) % 2147483648
-        noise = 1.0 if seed < 1073741824 else -1.0  # rounding errors add like a random walk
-        local = 0.3 * SAFETY * power
-        rounding = 2.2e-16 * noise
-        counted = local * max(h * abs(W[n]), 0.5 * abs(W[n - 1]))
-        error_theta += math.copysign(counted, error_theta) + rounding * abs(theta)
-        counted = local * max(h * abs(W[ROW + n]), 0.5 * abs(W[ROW + n - 1]))
-        error_w += math.copysign(counted, error_w) + rounding * abs(w)
-        passed, slope = 0.0 if turned else h, _slope(W, n, h)
-        worst = max(worst, abs(error_theta))
+        rounding = 2.2e-16 if seed < 1073741824 else -2.2e-16  # rounding errors add like a random walk
+        for a in range(2):
+            series = skip(W, a * ROW)
+            change = h * _value(skip(series, 1), n - 1, h) + lost[a]
+            new = series[0] + change
+            lost[a] = change - (new - series[0])
+            s[1 + a] = new
+            counted = power * max(h * abs(series[n]), 0.5 * abs(series[n - 1]))
+            error[a * ROW] += math.copysign(counted, error[a * ROW]) + rounding * abs(new)
+        worst = max(worst, abs(error[0]))
+        passed = 0.0 if turned else h
+        slope = _slope(w_row, n, h)
         if turned:
-            w, w_lo, resting = 0.0, 0.0, True
-    if passed > 0.0:
-        s[0], s[1], s[2], s[3] = hi + lo, theta, w, sign
-        call_jet(address, q.ctypes.data, s.ctypes.data, W.ctypes.data, R.ctypes.data, 1)
-        missing = max(SAFETY * passed * abs(W[2 * ROW] - slope) / (n + 1) - counted, 0.0)
-        worst = max(worst, abs(error_theta) + passed * missing / (n + 2))
-    return DONE, steps, n_events, worst
+            s[2] = lost[1] = 0.0
+            resting = True
+    if passed > 0.0 and report[0] == DONE:
+        s[0] = hi + lo
+        s[3] = sign
+        call_jet(address, q, s, W, R, 1)
+        missing = SAFETY * passed * abs(W[2 * ROW] - slope) / (n + 1) - counted
+        worst = max(worst, abs(error[0]) + passed * max(missing, 0.0) / (n + 2))
+    report[1] = steps
+    report[2] = found
+    report[3] = worst
