@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from toolkit.errors import JobError, UsageError
-from toolkit.search import Hypothesis, find_round_movers
+from toolkit.search import Hypothesis, even_light, find_round_movers
 from toolkit.sight import LUMA, Sight, best_sight, small_planes
 from toolkit.swing import Swing, fit_swing, start_swing
 from toolkit.trackers.disc import fit_disc
@@ -29,6 +29,13 @@ class Rough:
     sight: Sight
 
 
+def _repeats(batch: list[Frame]) -> frozenset[int]:
+    """Frames that show the one before once more; none where that is no exception (nothing moves between frames)."""
+    prints = [f.luma[4::16, 4::16].astype(np.int16) for f in batch]
+    found = frozenset(i for i in range(1, len(batch)) if np.abs(prints[i] - prints[i - 1]).max() <= 1)
+    return found if len(found) < 0.3 * len(batch) else frozenset()
+
+
 def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float | None, what: str) -> Rough:
     """The thing in `batch` that is round and swings. `bob` is where it is on the first frame, if the user said so.
 
@@ -38,6 +45,7 @@ def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float 
     if bob is not None and not (0 <= bob[0] < width and 0 <= bob[1] < height):
         raise UsageError(f"bob ({bob[0]:g}, {bob[1]:g}) lies outside the picture of {width}×{height} px")
     moved = False
+    repeated = _repeats(batch)
     for colour in (False, True):
         candidates, samples = _hypotheses(batch, bob, radius, colour)
         moved = moved or bool(candidates)
@@ -46,11 +54,11 @@ def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float 
             start = samples[h.sample]
             if best is not None and _same(best, h, start):
                 continue
-            rough = _follow(batch, start, h, sight, radius)
+            rough = _follow(batch, start, h, sight, radius, repeated)
             if rough is not None and (best is None or rough.score > best.score):
                 best = rough
         if best is not None:
-            return _in_best_sight(batch, best, radius)
+            return _in_best_sight(batch, best, radius, repeated)
     if not moved:
         raise JobError(f"nothing that moves was found in {what}; film the swinging bob, or {REMEDY}")
     raise JobError(f"nothing in {what} moves like a pendulum; if there is one, {REMEDY}")
@@ -70,7 +78,8 @@ def _hypotheses(
     pictures = [small_planes(batch[i], factor, colour) for i in samples]
     found = []
     for k, sight in enumerate(sights):
-        movers = find_round_movers([p[k] for p in pictures], factor)
+        planes = [p[k] for p in pictures]
+        movers = find_round_movers(planes if colour else even_light(planes), factor)
         found += [(sight, h._replace(radius_px=radius or h.radius_px)) for h in movers]
     return found, samples
 
@@ -86,7 +95,14 @@ def _same(rough: Rough, h: Hypothesis, start: int) -> bool:
     )
 
 
-def _follow(batch: list[Frame], start: int, h: Hypothesis, sight: Sight, radius: float | None) -> Rough | None:
+def _follow(
+    batch: list[Frame],
+    start: int,
+    h: Hypothesis,
+    sight: Sight,
+    radius: float | None,
+    repeated: frozenset[int] = frozenset(),
+) -> Rough | None:
     """Follow a hypothesis through the batch against a wall of one level; None unless it swings."""
     first = flat_fit(
         batch[start], sight, Look(h.radius_px, max(0.8, 0.12 * h.radius_px)), Guess(h.x_px, h.y_px), free=True
@@ -113,12 +129,24 @@ def _follow(batch: list[Frame], start: int, h: Hypothesis, sight: Sight, radius:
         looks.append(fit[2])
         return True
 
+    def look_around(i: int, x: float, y: float) -> bool:
+        """The frame next to the first may show the bob some diameters away: the nearest like it that can be found."""
+        for reach in (1.2, 2.4, 3.6):
+            for a in np.arange(0.0, 2 * np.pi, np.pi / 4 if reach < 2 else np.pi / 6):
+                far = reach * look.radius_px
+                if take(i, Guess(x + far * float(np.cos(a)), y + far * float(np.sin(a)))):
+                    return True
+        return False
+
     for way in (1, -1):
         recent = [(batch[start].t_s, x, y)]
         misses = 0
         i = start + way
         while 0 <= i < len(batch) and misses < 4:
-            if take(i, Guess(*extrapolate(recent, batch[i].t_s))):
+            if i in repeated:
+                i += way
+                continue
+            if take(i, Guess(*extrapolate(recent, batch[i].t_s))) or (len(recent) == 1 and look_around(i, x, y)):
                 recent = [*recent, (batch[i].t_s, *points[i])][-3:]
                 misses = 0
             else:
@@ -127,7 +155,7 @@ def _follow(batch: list[Frame], start: int, h: Hypothesis, sight: Sight, radius:
     swing = _swing_of(batch, points, look)
     tried: set[int] = set()
     while swing is not None and len(points) < len(batch):  # what lies behind a gap: where the motion says
-        left = [i for i in range(len(batch)) if i not in points and i not in tried]
+        left = [i for i in range(len(batch)) if i not in points and i not in tried and i not in repeated]
         if not left:
             break
         near = [i for i in left if min(abs(i - p) for p in points) <= 24] or left[:1]
@@ -166,7 +194,7 @@ def _swing_of(batch: list[Frame], points: dict[int, tuple[float, float]], look: 
     return swing
 
 
-def _in_best_sight(batch: list[Frame], rough: Rough, radius: float | None) -> Rough:
+def _in_best_sight(batch: list[Frame], rough: Rough, radius: float | None, repeated: frozenset[int]) -> Rough:
     """The same thing, looked at in the mix of planes in which it stands out best."""
     some = list(rough.points)[:: max(1, len(rough.points) // 8)]
     sight = best_sight([batch[i] for i in some], [rough.points[i] for i in some], rough.look.radius_px)
@@ -174,7 +202,7 @@ def _in_best_sight(batch: list[Frame], rough: Rough, radius: float | None) -> Ro
         return rough
     start = some[len(some) // 2]
     h = Hypothesis(0, *rough.points[start], rough.look.radius_px, 0, 1.0)
-    return _follow(batch, start, h, sight, radius) or rough
+    return _follow(batch, start, h, sight, radius, repeated) or rough
 
 
 def flat_fit(

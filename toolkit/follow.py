@@ -57,6 +57,7 @@ class Follower:
         self.hidden = 0
         self.astray = 0.0  # how far the bob was from the fitted motion lately, px
         self._fitted_at = 0
+        self._shade = np.nan  # the bob's own brightness lately
         self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
         self.interval_s = float(np.median(np.diff([f.t_s for f in batch]))) or 1 / 30
         self._print: np.ndarray | None = None
@@ -272,6 +273,8 @@ class Follower:
         r.repeated.append(self._is_repeat(frame))
         if ok and patch is not None:
             self.hidden = 0
+            shade = place.contrast + place.wall
+            self._shade = shade if np.isnan(self._shade) else 0.9 * self._shade + 0.1 * shade
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
                 self._refit()
             self.recent.append((frame.t_s, place.x_px, place.y_px))
@@ -298,10 +301,13 @@ class Follower:
         look = self.look
         if not np.isfinite(place.x_px):
             return False
+        ratio = place.contrast / look.contrast
+        # before something of another shade the contrast is another, but the bob is as bright as ever
+        same = abs(place.contrast + place.wall - self._shade) < 0.25 * abs(look.contrast) and ratio > 0.15
         return bool(
             place.visible >= 0.85
             and place.misfit < 2 * self.ordinary_misfit + 0.03 * abs(look.contrast)
-            and 0.5 < place.contrast / look.contrast < 2.0
+            and (0.5 < ratio < 2.0 or same)
             and np.hypot(place.x_px - x, place.y_px - y) < 0.6 * look.radius_px + 2
         )
 

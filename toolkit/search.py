@@ -36,6 +36,14 @@ def shrink(plane: np.ndarray, factor: int) -> np.ndarray:
     return cut.astype(np.float32)
 
 
+def even_light(samples: list[np.ndarray]) -> list[np.ndarray]:
+    """The pictures (h, w) with each row's brightness as it is on most of them: flicker and drifting light are no motion."""
+    if len(samples) < 5:
+        return samples
+    usual = np.maximum(np.median(np.stack(samples), axis=0), 1.0)
+    return [(p / np.clip(np.median(p / usual, axis=1), 0.5, 2.0)[:, None]).astype(np.float32) for p in samples]
+
+
 def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 8) -> list[Hypothesis]:
     """Hypotheses, best first, from shrunken frames (h, w) float32 that `factor` has shrunk; needs three or more."""
     import cv2

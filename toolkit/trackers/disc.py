@@ -51,9 +51,8 @@ def locate(patch: Patch, look: Look, guess: Guess) -> Place:
     out = fit_disc(patch, look, guess)
     if out is None or out[4] <= 0 or out[5] <= 0:
         return NOWHERE
-    return Place(
-        out[0] + patch.x_px, out[1] + patch.y_px, float(np.sqrt(out[4])), float(np.sqrt(out[5])), out[7], out[8], out[9]
-    )
+    x, y, sx, sy = out[0] + patch.x_px, out[1] + patch.y_px, float(np.sqrt(out[4])), float(np.sqrt(out[5]))
+    return Place(x, y, sx, sy, out[7], out[8], out[9], out[10] * out[12])
 
 
 LOCALISER = Localiser("disc", "least squares of a shaded disc with a soft edge and motion blur (default)", locate)

@@ -53,7 +53,7 @@ class Guess(NamedTuple):
 
 class Place(NamedTuple):
     """Where the bob was found. `misfit` is the rms of the fit in grey levels, `visible` the fraction of the outline
-    that was seen, `contrast` bob minus wall. A localiser that finds nothing returns NaN for x and y."""
+    that was seen, `contrast` bob minus wall, `wall` the level of the wall if it was measured. A localiser that finds nothing returns NaN for x and y."""
 
     x_px: float
     y_px: float
@@ -62,6 +62,7 @@ class Place(NamedTuple):
     misfit: float
     visible: float
     contrast: float
+    wall: float = np.nan
 
 
 NOWHERE = Place(np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0.0)
