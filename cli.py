@@ -362,7 +362,7 @@ def main() -> None:
     try:
         code = app(standalone_mode=False)
     except (typer.Abort, KeyboardInterrupt):
-        _fail("stopped; nothing unfinished was left behind", 130)
+        code = 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
@@ -377,6 +377,8 @@ def main() -> None:
             raise
         kind = "out of memory" if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"
         _fail(f"unexpected trouble ({kind}); set PENDULAB_DEBUG=1 to see where, and tell the developers", 1)
+    if code == 130:  # Ctrl-C, by whichever way it came through the parser
+        _fail("stopped; nothing unfinished was left behind", 130)
     sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -70,7 +70,7 @@ def test_the_files_have_the_promised_columns_and_keys(demo):
     assert set(track.status) <= {"ok", "predicted", "lost"}
     theta = pd.read_csv(out / "theta.csv")
     assert list(theta.columns) == ["t_s", "theta_rad", "sigma_theta_rad"]
-    assert len(theta) == (track.status != "lost").sum()
+    assert len(theta) == (track.status == "ok").sum()  # measured frames only
     calibration = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     assert {"pivot_px", "radius_px", "vertical_rad", "fps", "time_source"} <= set(calibration)
     fit = json.loads((out / "fit.json").read_text(encoding="utf-8"))
@@ -284,3 +284,22 @@ def test_help_of_every_command():
     for command in ["demo", "track", "fit", "report", "simulate", "render", "cost", "paper", "batch", "convert", "effects", "models", "trackers"]:
         assert command in listing.stdout
         assert pendulab(command, "--help").returncode == 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+def test_stopping_leaves_nothing_behind(tmp_path):
+    import signal
+    import time
+
+    clip = ROOT / "data" / "samples" / "pendulum.mp4"
+    command = [sys.executable, str(ROOT / "cli.py"), "report", str(clip), "--out", str(tmp_path / "out")]
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8")
+    while not (tmp_path / "out").exists():
+        assert running.poll() is None
+        time.sleep(0.02)
+    running.send_signal(signal.SIGINT)
+    _, said = running.communicate(timeout=120)
+    assert running.returncode == 130
+    assert said.splitlines()[-1].startswith("pendulab: stopped")
+    assert "Traceback" not in said
+    assert not (tmp_path / "out").exists()
