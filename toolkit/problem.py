@@ -392,7 +392,7 @@ class Problem:
                 return None
             parameters.add(name, value=begin[name])
         minimizer = lmfit.Minimizer(
-            lambda p: evaluate(p)[0], parameters, scale_covar=False, max_nfev=100, nan_policy="omit"
+            lambda p: evaluate(p)[0], parameters, scale_covar=False, max_nfev=100, nan_policy="propagate"
         )
         with np.errstate(all="ignore"):
             try:
@@ -435,7 +435,7 @@ class Problem:
         rows = len(self.priors)
         try:
             seen, by, _ = self.predict(values, free)
-            whole = bool(np.all(np.isfinite(seen)) and np.all(np.isfinite(by)))
+            whole = math.isfinite(float(seen.sum()) + float(by.sum()))
         except (PendulabError, ValueError, ArithmeticError, RuntimeError):
             whole = False
         if not whole:

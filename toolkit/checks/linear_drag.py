@@ -104,7 +104,7 @@ def _fails(
     where: dict[str, float]
     if quadratic >= friction or loss.mu == 0:
         visible = min(_VISIBLE_SHARE, quadratic / 2)
-        threshold = min(loss.amplitude_of_share(visible), largest)
+        threshold = min(max(loss.amplitude_of_share(visible), float(np.min(amplitude))), largest)
         inside = amplitude >= threshold
         where = {"amplitude_above_rad": threshold, "amplitude_equal_loss_rad": loss.amplitude_of_share(0.5)}
         sentence = (

@@ -218,7 +218,9 @@ class Model:
             coefficients += [n for n in ("alpha_d", "mu") if n in scale and n not in by and values[n] != 0]
         asked = [_EQUATION_NAME[name] for name in coefficients]
         moving = "theta0" in by or "phi" in by
-        by_omega_start = abs(start.omega) * values["omega_g"] >= abs(self._acceleration(values, start.theta, start.omega))
+        by_omega_start = abs(start.omega) * values["omega_g"] >= abs(
+            self._acceleration(values, start.theta, start.omega)
+        )
         if moving:
             asked.append("omega0_rad_per_s" if by_omega_start else "theta0_rad")
         solution = self._solve(parameters, start, t_s, asked)
