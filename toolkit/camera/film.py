@@ -12,6 +12,7 @@ from toolkit.errors import JobError, UsageError
 
 _ENCODERS = {"h264": "libx264", "hevc": "libx265", "mjpeg": "mjpeg"}
 _PRESETS = {
+    ("h264", "least"): "ultrafast",
     ("h264", "quick"): "superfast",
     ("h264", "thorough"): "medium",
     ("hevc", "quick"): "ultrafast",
