@@ -57,7 +57,9 @@ class Follower:
         self.hidden = 0
         self.astray = 0.0  # how far the bob was from the fitted motion lately, px
         self._fitted_at = 0
-        self._shade = np.nan  # the bob's own brightness lately
+        self._shade = np.nan  # the bob's own brightness lately, and how much it changes
+        self._shade_scatter = 0.03 * abs(rough.look.contrast)
+        self.first: list[Frame] = []  # the frames read ahead, if they are the first that will be followed
         self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
         self.interval_s = float(np.median(np.diff([f.t_s for f in batch]))) or 1 / 30
         self._print: np.ndarray | None = None
@@ -272,12 +274,9 @@ class Follower:
         r.shift.append(shift if self.shaking else None)
         r.repeated.append(self._is_repeat(frame))
         if ok and patch is not None:
-            self.hidden = 0
-            shade = place.contrast + place.wall
-            self._shade = shade if np.isnan(self._shade) else 0.9 * self._shade + 0.1 * shade
+            self._remember(frame, place)
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
                 self._refit()
-            self.recent.append((frame.t_s, place.x_px, place.y_px))
             self._update_background(patch, place, guess)
             if len(r.index) % _STRING_EVERY == 1:
                 self._measure_string(frame, place, shift)
@@ -285,6 +284,9 @@ class Follower:
             self.hidden += 1
             if self.hidden == 2:
                 self._refit()
+        if len(r.index) == len(self.first):
+            self._look_back(self.first)
+            self.first = []
 
     def _locate(self, patch: Patch, guess: Guess) -> Place:
         if not self.hidden and len(self.recent) == 3:
@@ -302,14 +304,53 @@ class Follower:
         if not np.isfinite(place.x_px):
             return False
         ratio = place.contrast / look.contrast
-        # before something of another shade the contrast is another, but the bob is as bright as ever
-        same = abs(place.contrast + place.wall - self._shade) < 0.25 * abs(look.contrast) and ratio > 0.15
+        shade = abs(place.contrast + place.wall - self._shade)
+        if np.isnan(shade) or self.hidden > 15:
+            bright = 0.5 < ratio < 2.0
+        else:  # before something of another shade the contrast is another, but the bob is as bright as ever
+            bright = 0.15 < ratio < 2.5 and shade < 0.1 * abs(look.contrast) + 3 * self._shade_scatter
         return bool(
-            place.visible >= 0.85
+            bright
+            and place.visible >= 0.85
             and place.misfit < 2 * self.ordinary_misfit + 0.03 * abs(look.contrast)
-            and (0.5 < ratio < 2.0 or same)
             and np.hypot(place.x_px - x, place.y_px - y) < 0.6 * look.radius_px + 2
         )
+
+    def _remember(self, frame: Frame, place: Place) -> None:
+        """What the next frames are judged by."""
+        self.hidden = 0
+        self.recent.append((frame.t_s, place.x_px, place.y_px))
+        shade = place.contrast + place.wall
+        if np.isnan(self._shade):
+            self._shade = shade
+        else:
+            self._shade_scatter += 0.1 * (abs(shade - self._shade) - self._shade_scatter)
+            self._shade += 0.1 * (shade - self._shade)
+
+    def _look_back(self, frames: list[Frame]) -> None:
+        """Look again, backwards in time, for the bob on the frames read ahead on which it was not found."""
+        r = self.record
+        if all(r.ok):
+            return
+        self._refit()
+        kept = self.recent, self.hidden
+        self.recent = deque(maxlen=3)
+        for k in reversed(range(len(frames))):
+            frame = frames[k]
+            if r.ok[k]:
+                self.recent.append((frame.t_s, r.place[k].x_px, r.place[k].y_px))
+                self.hidden = 0
+            elif self.recent:
+                x, y, vx, vy = self._expect(frame.t_s)
+                guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
+                patch = self._patch(frame, self.look, guess)
+                place = NOWHERE if patch is None else self._locate(patch, guess)
+                if self._believe(place, x, y):
+                    r.place[k], r.ok[k] = place, True
+                    self._remember(frame, place)
+                else:
+                    self.hidden += 1
+        self.recent, self.hidden = kept
 
     def _expect(self, t: float) -> tuple[float, float, float, float]:
         """Where the bob should be at time t and how fast, px and px/s: the fitted motion, moved by how far the bob was
@@ -327,7 +368,7 @@ class Follower:
             return x, y, vx, vy
         offs = [(r[1] - a, r[2] - b) for r, a, b in zip(recent, xs, ys)]
         (ox, oy), far = offs[-1], t - recent[-1][0]
-        if len(recent) == 2 and not self.hidden and recent[1][0] > recent[0][0]:
+        if len(recent) == 2 and not self.hidden and recent[1][0] != recent[0][0]:
             lead = min(1.0, far / (recent[1][0] - recent[0][0]))
             ox, oy = ox + lead * (ox - offs[0][0]), oy + lead * (oy - offs[0][1])
         self.astray = float(np.hypot(ox, oy))

@@ -138,6 +138,7 @@ def _begin(
             continue
         follower = Follower(batch, rough, pivot, radius, localiser)
         if every == 1:
+            follower.first = batch
             return follower, chain(batch, used)
         follower.interval_s /= every
         follower.exposure_s = min(follower.exposure_s, follower.interval_s)
@@ -496,7 +497,7 @@ def _poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, follower: Follow
             f"the bob's places stray {swing.rms_px:.2f} px (rms) from a plane pendulum's swing on a circle: the camera was tilted "
             "or shook, its lens distorts, the bob swung out of the plane, or it was not followed well"
         )
-    if good.mean() < 0.8:
+    if good.mean() < 0.7:
         said.append(f"the bob was measured on only {good.mean():.0%} of the frames")
     return said
 
