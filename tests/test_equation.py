@@ -174,3 +174,24 @@ def test_dop853_table_obeys_the_order_conditions():
     for power in range(7):
         assert weights @ matrix @ nodes**power == pytest.approx(1 / ((power + 1) * (power + 2)), abs=1e-14)
     assert matrix.sum(axis=1) == pytest.approx(nodes, abs=1e-13)
+
+
+def test_printed_equation_collects_powers_and_keeps_signs():
+    assert build_equation(["linear_drag"]).latex.endswith(r"- k_d \ell^{2} \dot\theta")
+    assert build_equation(["quadratic_drag"]).latex.endswith(r"- c \ell^{3} |\dot\theta| \dot\theta")
+    moving = build_equation(["linear_drag", "moving_pivot"]).latex
+    assert r"- k_d \ell \left(\ell \dot\theta - " in moving  # the velocity against the room, as one factor
+    assert r"- m \ell \left(-a" in moving
+
+
+def test_first_compilation_is_announced_and_the_next_is_not(tmp_path, monkeypatch):
+    from toolkit.motion import compiled
+    from toolkit.motion.equation import Equation
+
+    heard = []
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "listener", heard.append)
+    for _ in range(2):
+        assert "jet" in Equation(build_equation(["quadratic_drag"]).effects).source
+    assert len(heard) == 1
+    assert "compiling" in heard[0]

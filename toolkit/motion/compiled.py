@@ -17,6 +17,15 @@ from pathlib import Path
 from types import ModuleType
 
 
+def _tell_terminal(message: str) -> None:
+    if sys.stderr is not None and sys.stderr.isatty():
+        print(message, file=sys.stderr)
+
+
+listener: Callable[[str], None] = _tell_terminal
+"""Hears of what takes seconds, before it starts; an interface may put its own in its place."""
+
+
 @cache
 def cache_folder() -> Path:
     """The folder of generated code, made if need be."""

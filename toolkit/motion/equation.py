@@ -16,6 +16,7 @@ from toolkit.effects import load_effect
 from toolkit.effects.effect import Effect, Term
 from toolkit.effects.formula import formula_needs, formula_parameters
 from toolkit.errors import JobError, UsageError
+from toolkit.motion.blocks import blocks
 from toolkit.motion.symbols import (
     SCENE_SYMBOLS,
     Latex,
@@ -106,7 +107,7 @@ class Equation:
             torque = torque + h.amplitude * latex_functions()["cos"](
                 2 * Latex(r"\pi") * h.f_hz * Latex("t") + h.phase_rad
             )
-        return rf"{inertia.at(2)}\,\ddot\theta = {torque.text}"
+        return rf"{inertia.at(1)}\,\ddot\theta = {torque.text}"
 
     def terms_at(self, parameters: Mapping[str, float], t_s: Any, theta_rad: Any, omega_rad_per_s: Any) -> Motion:
         """Torque, inertia, tension and energy at states, as numbers or arrays. Raises UsageError for a missing parameter."""
@@ -122,30 +123,36 @@ class Equation:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tension (N) and energy (J) along a motion: as `terms_at`, without evaluating what does not enter them."""
         values = dict(zip(self.parameters, self._values(parameters)))
-        mass, length, g = parameters["mass_kg"], values["length_m"], values["g_m_per_s2"]
-        values["mass_kg"] = mass
-        square = omega_rad_per_s * omega_rad_per_s
-        rise = theta_rad * theta_rad / 2 if self.small_angle else 1.0 - np.cos(theta_rad)
-        weight = mass * g * length
-        inertia, tension, energy = mass * length**2, (mass * length) * square + (mass * g) * (1.0 - rise), weight * rise
-        if self._observed:
-            functions, state = number_functions(), {"t": t_s, "theta": theta_rad, "omega": omega_rad_per_s}
-            seen = symbols(functions, state, values, self.effects, self.small_angle, self.formula_text)
-            for effect in self._observed:
-                term = effect.term(seen[effect.name])
-                inertia, tension, energy = inertia + term.inertia, tension + term.radial_force, energy + term.energy
-        return tension, energy + (inertia / 2) * square
+        values["mass_kg"] = mass = parameters["mass_kg"]
+        length, g = values["length_m"], values["g_m_per_s2"]
+        tension, energy = np.empty(t_s.size), np.empty(t_s.size)
+        for part in blocks(t_s.size):
+            t, theta, omega = t_s[part], theta_rad[part], omega_rad_per_s[part]
+            square = omega * omega
+            rise = theta * theta / 2 if self.small_angle else 1.0 - np.cos(theta)
+            inertia, pull, stored = mass * length**2, (mass * length) * square + (mass * g) * (1.0 - rise), 0.0
+            if self._observed:
+                functions, state = number_functions(), {"t": t, "theta": theta, "omega": omega}
+                seen = symbols(functions, state, values, self.effects, self.small_angle, self.formula_text)
+                for effect in self._observed:
+                    term = effect.term(seen[effect.name])
+                    inertia, pull, stored = inertia + term.inertia, pull + term.radial_force, stored + term.energy
+            tension[part], energy[part] = pull, (mass * g * length) * rise + stored + (inertia / 2) * square
+        return tension, energy
+
+    @cached_property
+    def _sampled(self) -> list[tuple[Effect, Term]]:
+        """The effects (but `formula`, a torque and nothing else) with their terms for a motion of ones."""
+        values = dict.fromkeys((*self.parameters, "mass_kg"), 1.0)
+        state = {"t": 0.1, "theta": 0.2, "omega": 0.3}
+        seen = symbols(number_functions(), state, values, self.effects, self.small_angle, self.formula_text)
+        return [(effect, effect.term(seen[effect.name])) for effect in self.effects if effect.name != "formula"]
 
     @cached_property
     def _observed(self) -> tuple[Effect, ...]:
         """The effects that enter tension or energy."""
-        values = dict.fromkeys((*self.parameters, "mass_kg"), 1.0)
-        state = {"t": 0.1, "theta": 0.2, "omega": 0.3}
-        seen = symbols(number_functions(), state, values, self.effects, self.small_angle, self.formula_text)
         nothing = Term()
-        terms = [(effect, effect.term(seen[effect.name])) for effect in self.effects if effect.name != "formula"]
-        kept = [e for e, t in terms if (t.inertia, t.radial_force, t.energy) != (nothing.inertia, 0, 0)]
-        return tuple(kept)
+        return tuple(e for e, t in self._sampled if (t.inertia, t.radial_force, t.energy) != (nothing.inertia, 0, 0))
 
     def _motion(self, seen: dict[str, Symbols]) -> Motion:
         s = seen[""]
@@ -163,7 +170,7 @@ class Equation:
         """What moves the bob while the string is slack: gravity less buoyancy, drag, and the shaking of the frame."""
         values = dict(zip(self.parameters, self._values(parameters)))
         mass, g, length = (values[n] for n in ("mass_kg", "g_m_per_s2", "length_m"))
-        drags = [e for e in self.effects if e.name in ("linear_drag", "quadratic_drag", "sphere_drag", "added_mass")]
+        drags = [effect for effect, term in self._sampled if not isinstance(term.drag, int)]
         names = {e.name for e in self.effects}
         moving = [e for e in self.effects if e.pivot is not None]
         displaced = carried = 0.0
@@ -230,6 +237,7 @@ class Equation:
         )
         module = compiled.load(name)
         if module is None:
+            compiled.listener("compiling the equation of motion (once; later runs find it ready)")
             compiled.place(name, self._derive())
             module = compiled.load(name)
         if module is None:

@@ -6,6 +6,7 @@ computed from cannot differ.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
@@ -101,10 +102,15 @@ _SUM, _PRODUCT, _UNARY, _POWER, _ATOM = range(5)
 
 
 class Latex:
-    """LaTeX text that knows enough of precedence to be added, multiplied and raised to powers."""
+    """LaTeX text that knows enough of precedence to be added, multiplied and raised to powers.
 
-    def __init__(self, text: str, level: int = _ATOM):
-        self.text, self.level = text, level
+    factors : of a product, as (text, level, power), so that equal ones can be collected; the sign is left out.
+    """
+
+    def __init__(self, text: str, level: int = _ATOM, factors: tuple[tuple[str, int, int], ...] = ()):
+        self.text, self.level, self.factors = text, level, factors
+        if not factors:
+            self.factors = ((text.removeprefix("-") if level > _SUM else text, level, 1),)
 
     @staticmethod
     def of(value: Any) -> Latex:
@@ -142,9 +148,10 @@ class Latex:
     def __neg__(self) -> Latex:
         if self.is_zero():
             return self
-        if self.text.startswith("-") and self.level == _PRODUCT:
-            return Latex(self.text[1:].lstrip(), _PRODUCT)
-        return Latex("-" + self.at(_PRODUCT), _PRODUCT)
+        if self.text.startswith("-") and self.level in (_PRODUCT, _UNARY):
+            return Latex(self.text[1:].lstrip(), _PRODUCT, self.factors)
+        factors = self.factors if self.level > _SUM else ((self.text, _SUM, 1),)
+        return Latex("-" + self.at(_PRODUCT), _PRODUCT, factors)
 
     def __sub__(self, other: Any) -> Latex:
         return (
@@ -164,17 +171,18 @@ class Latex:
             return -other
         if self.is_zero() or other.is_zero():
             return Latex("0")
-        if other.text.startswith("-"):
-            return (
-                -(self * -other)
-                if other.level == _PRODUCT
-                else Latex(rf"{self.at(_PRODUCT)} \left({other.text}\right)", _PRODUCT)
-            )
-        if self.level == _ATOM and (other.text == self.text or other.text.startswith(self.text + " ")):
-            squared = Latex(rf"{{{self.text}}}^{{2}}", _POWER)
-            return squared if other.text == self.text else squared * Latex(other.text[len(self.text) + 1 :], _PRODUCT)
-        dot = r" \cdot " if other.text[0].isdigit() else r" "
-        return Latex(self.at(_PRODUCT) + dot + other.at(_PRODUCT), _PRODUCT)
+        for one in (self, other):
+            if one.text.startswith("-") and one.level in (_PRODUCT, _UNARY):
+                return -(-self * other) if one is self else -(self * -other)
+        powers: dict[tuple[str, int], int] = {}
+        for text, level, power in (*self.factors, *other.factors):
+            powers[text, level] = powers.get((text, level), 0) + power
+        factors = tuple((text, level, power) for (text, level), power in powers.items())
+        shown = ""
+        for factor in factors:
+            part = _raised(*factor)
+            shown += (r" \cdot " if part[0].isdigit() else " ") + part if shown else part
+        return Latex(shown, _PRODUCT, factors)
 
     def __rmul__(self, other: Any) -> Latex:
         return Latex.of(other) * self
@@ -188,7 +196,17 @@ class Latex:
         return Latex.of(other) / self
 
     def __pow__(self, power: Any) -> Latex:
+        if isinstance(power, int) and len(self.factors) == 1 and not self.text.startswith("-"):
+            text, level, before = self.factors[0]
+            return Latex(_raised(text, level, before * power), _POWER, ((text, level, before * power),))
         return Latex(rf"{{{self.at(_ATOM)}}}^{{{Latex.of(power).text}}}", _POWER)
+
+
+def _raised(text: str, level: int, power: int) -> str:
+    if power == 1:
+        return Latex(text, level).at(_PRODUCT)
+    base = Latex(text, level).at(_ATOM)
+    return rf"{base}^{{{power}}}" if re.fullmatch(r"[A-Za-z]|\\[A-Za-z]+", base) else rf"{{{base}}}^{{{power}}}"
 
 
 def latex_functions() -> dict[str, Any]:
@@ -204,7 +222,8 @@ def latex_functions() -> dict[str, Any]:
         return Latex(rf"\operatorname{{sgn}}\left({Latex.of(x).text}\right)", _POWER)
 
     def absolute(x: Latex) -> Latex:
-        return Latex(rf"\left|{Latex.of(x).text}\right|")
+        text = Latex.of(x).text
+        return Latex(f"|{text}|" if " " not in text else rf"\left|{text}\right|")
 
     def root(x: Latex) -> Latex:
         return Latex(rf"\sqrt{{{Latex.of(x).text}}}")

@@ -309,23 +309,10 @@ def _equation(material: Material) -> Section:
     words, best = material.words, material.best
     blocks: list[Block] = [Paragraph(words("text.equation", model=model_name(words, best.model)))]
     if best.equation_latex:
-        latex = _collected(best.equation_latex)
-        blocks.append(Equation(latex, formula("equation", latex)))
+        blocks.append(Equation(best.equation_latex, formula("equation", best.equation_latex)))
     blocks.append(_parameter_table(words, best))
     blocks.append(Paragraph(f"{words('text.conventions')} {words('text.start')}"))
     return Section("equation", words("section.equation"), tuple(blocks))
-
-
-def _collected(latex: str) -> str:
-    """The equation with its lengths collected: ℓ ℓ as ℓ²."""
-    for old, new in (
-        (r"\left(m {\ell}^{2}\right)", r"m \ell^{2}"),
-        (r"\left|\dot\theta\right|", r"|\dot\theta|"),
-        (r"\ell |\dot\theta| \ell \ell", r"\ell^{3} |\dot\theta|"),
-        (r"\ell \ell", r"\ell^{2}"),
-    ):
-        latex = latex.replace(old, new)
-    return latex
 
 
 def _parameter_table(words: Words, result: FitResult) -> Table:
