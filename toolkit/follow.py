@@ -308,7 +308,7 @@ class Follower:
         if np.isnan(shade) or self.hidden > 15:
             bright = 0.5 < ratio < 2.0
         else:  # before something of another shade the contrast is another, but the bob is as bright as ever
-            bright = 0.15 < ratio < 2.5 and shade < 0.1 * abs(look.contrast) + 3 * self._shade_scatter
+            bright = 0.3 < ratio < 2.5 and shade < 0.1 * abs(look.contrast) + 3 * self._shade_scatter
         return bool(
             bright
             and place.visible >= 0.85

@@ -21,6 +21,7 @@ from toolkit.trackers import load_tracker
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
+_MOST = 3.0  # by how much a fit's own σ may be too small (noise that a codec has smeared)
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,6 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     x, y = x + shift.raw_x - shift.x, y + shift.raw_y - shift.y
     swing = _whole_swing(start, t, x, y, good, video.path)
     _require_pendulum(swing, t, x, y, good, video.path)
-    warnings += _poor_motion(swing, t, good, follower)
     mx, my = swing.position(t)
     slips = _clock_slips(t, x - mx, y - my, swing, good)
     if slips.size:
@@ -218,7 +218,15 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     time_sigma = video.tick_s / np.sqrt(12) if video.tick_s > 2e-4 and not evened else 0.0
     vx, vy = (np.hypot(v * time_sigma, shift.sigma) for v in swing.velocity(t))
     scale = _true_sigma(x - mx, sx, good, vx), _true_sigma(y - my, sy, good, vy)
+    sigma = shift.sigma
+    if follower.shaking and max(scale) > _MOST:  # more than the picture explains: the camera's shift is known no better
+        left = [np.sqrt(max(f**2 - _MOST**2, 0.0)) * np.median(s[good]) for f, s in zip(scale, (sx, sy))]
+        sigma = np.hypot(sigma, float(np.hypot(*left)) / np.sqrt(2))
+        scale = min(scale[0], _MOST), min(scale[1], _MOST)
     sx, sy = sx * scale[0], sy * scale[1]
+    warnings += _poor_motion(
+        swing, t, good, float(np.median(np.hypot(np.hypot(sx, sy)[good] / np.sqrt(2), sigma[good])))
+    )
     status = np.where(good, OK, LOST).astype("U9")
     bridged = _bridged(good, t, swing.period_s)
     spread = float(np.hypot(np.nanstd((x - mx)[good]), np.nanstd((y - my)[good])))
@@ -270,7 +278,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             "pivot_given": pivot is not None,
             "shift_x_px": shift.x,
             "shift_y_px": shift.y,
-            "shift_sigma_px": shift.sigma,
+            "shift_sigma_px": sigma,
             "time_sigma_s": time_sigma / fps_factor,
             "string_x_px": strings[:, 0],
             "string_y_px": strings[:, 1],
@@ -483,8 +491,8 @@ def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:
     return now, float(np.sqrt(max(slope @ swing.covariance @ slope, 0.0)))
 
 
-def _poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, follower: Follower) -> list[str]:
-    """Sentences on a motion that was accepted, but is not quite that of a pendulum."""
+def _poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, sigma_px: float) -> list[str]:
+    """Sentences on a motion that was accepted, but is not quite that of a pendulum; `sigma_px` is a place's error bar."""
     said = []
     growth, sigma = _growth(swing, t[good])
     if growth > 0.02 + 4 * sigma:
@@ -492,10 +500,10 @@ def _poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, follower: Follow
             f"the swing grows by {np.expm1(growth):.1%}: it is driven, or swings towards the camera by turns; a free decay "
             "does not describe it"
         )
-    if swing.rms_px > max(0.5, 0.02 * follower.look.radius_px):
+    if swing.rms_px > max(0.15, 3 * sigma_px) or swing.rms_px > 0.5:
         said.append(
             f"the bob's places stray {swing.rms_px:.2f} px (rms) from a plane pendulum's swing on a circle: the camera was tilted "
-            "or shook, its lens distorts, the bob swung out of the plane, or it was not followed well"
+            "or shook, its lens distorts, the bob swung out of the plane, was driven, or was not followed well"
         )
     if good.mean() < 0.7:
         said.append(f"the bob was measured on only {good.mean():.0%} of the frames")
