@@ -5,7 +5,7 @@
                                                       random scenes over all camera effects: locked, silent failures, σ
 
 Every scene is random by its number alone, so a failure is named by a number. A clip is
-- locked: a track came out, 95 % of the frames on which the bob is wholly visible are ok, rms error per axis below 1 px;
+- locked: a track came out, 95 % of the frames on which the bob is wholly visible (repeated pictures aside) are ok, rms error per axis below 1 px;
 - wrong: the rms error of ok frames is over 1 px, or θ is off by more than 5 σ of what calibration.json states: the
   zero (against vertical_sigma_rad), the scale (against angle_scale_relative_u) or the rest (against the σ of each frame);
 - a silent failure: wrong, and neither refused nor accompanied by a warning.
@@ -89,7 +89,8 @@ def measure(scene: Scene, video: Path, name: str = "") -> Outcome:
     if not found.ok.any():
         return Outcome(name, refused="no frame is ok", frames=truth.frame.size, cpu_s=cpu)
     row = np.searchsorted(truth.frame, found.frame)
-    ok, seen = found.ok, truth.visible[row] > 0.995
+    anew = np.concatenate([[True], np.diff(truth.t_s[row]) > 0])  # a repeated picture shows nothing of its own time
+    ok, seen = found.ok, (truth.visible[row] > 0.995) & anew
     dx, dy = found.x_px - truth.x_px[row], found.y_px - truth.y_px[row]
     nx, ny = (dx / found.sigma_x_px)[ok], (dy / found.sigma_y_px)[ok]
     theta = np.interp(series.t_s, found.t_s, truth.theta_rad[row])
