@@ -44,7 +44,7 @@ def test_full_model_returns_the_truth():
         {"theta0": 2.7, "duration_s": 40, "fps": 120},
         {"theta0": 0.6, "alpha_d": 0.32},
         {"theta0": 0.5, "duration_s": 1.0},
-        {"theta0": 0.5, "duration_s": 300, "alpha_d": 0.003, "fps": 20},
+        {"theta0": 0.5, "duration_s": 150, "alpha_d": 0.003, "fps": 20},
         {"theta0": 0.8, "phi": -2.5, "fps": 8},
         {"theta0": 0.5, "alpha_d": 5.5, "duration_s": 4, "phi": 1.4, "noise_rad": 1e-4},
     ],
@@ -54,7 +54,7 @@ def test_full_model_returns_the_truth():
         "155 degrees",
         "the paper's damping",
         "less than a period",
-        "200 periods",
+        "100 periods",
         "8 fps",
         "overdamped",
     ],
@@ -183,6 +183,47 @@ def test_angle_scale_prior_widens_theta0_only_as_it_should():
     assert result.parameters["omega_g"].stderr == pytest.approx(
         fit(series, model="small_angle_linear_drag").parameters["omega_g"].stderr, rel=0.1
     )
+
+
+def test_a_small_angle_model_is_not_preferred_where_its_omega_is_off():
+    series = swing(theta0=0.35, noise_rad=3e-3, duration_s=10, fps=20, alpha_d=0.01)
+    fits = fit_models(series)
+    small, full = fits["small_angle_linear_drag"], fits["full_linear_drag"]
+    assert small.aic < full.aic + 10
+    assert abs(small.parameters["omega_g"].value / 4.43 - 1) > 5 * small.parameters["omega_g"].stderr / 4.43
+    assert choose_model(fits) == "full_linear_drag"
+    assert choose_model({"small_angle_linear_drag": small}) == "small_angle_linear_drag"
+
+
+@pytest.mark.parametrize("sigma_known", [True, False])
+def test_correlated_residuals_do_not_pull_a_prior(sigma_known):
+    series = swing(theta0=0.4, duration_s=15, fps=30, rho=0.99, noise_rad=5e-3, seed=2)
+    sigma = np.full(len(series), 5e-4) if sigma_known else None
+    told = ThetaSeries(series.t_s, series.theta_rad, sigma, {"angle_scale_relative_u": 0.03})
+    result = fit(told)
+    scale = result.parameters["angle_scale"]
+    assert abs(scale.value) < 0.06
+    assert 0.015 < scale.stderr <= 0.031
+    within(result, theta0=0.4, omega_g=4.43)
+
+
+def test_a_prior_that_the_record_contradicts_is_said():
+    series = swing(theta0=0.8)
+    told = ThetaSeries(series.t_s, 1.05 * series.theta_rad, series.sigma_theta_rad, {"angle_scale_relative_u": 0.005})
+    result = fit(told)
+    assert result.parameters["angle_scale"].value == pytest.approx(0.05, abs=0.01)
+    assert any("angle_scale left what was measured" in warning for warning in result.warnings)
+
+
+def test_drags_that_would_be_negative_end_where_the_simpler_model_does():
+    series = swing(theta0=0.07, alpha_d=1e-6, noise_rad=3e-3, duration_s=22, fps=20, seed=4)
+    both = fit(series, model="full_linear_quadratic_coulomb")
+    drags = ("alpha_d", "beta", "mu")
+    alone = [fit(series, model=m).chi2 for m in ("full_linear_drag", "full_quadratic_drag", "full_undamped")]
+    assert both.success
+    assert all(both.parameters[name].value >= 0 for name in drags)
+    assert both.chi2 <= min(alone) + 1e-3
+    assert np.all(np.isfinite(both.covariance))
 
 
 def test_outliers_and_robust_loss():

@@ -172,18 +172,34 @@ def _shared(lead: FitResult, model: str) -> dict[str, float]:
 
 
 def choose_model(fits: Mapping[str, FitResult]) -> str:
-    """The name of the preferred model: the simplest whose AIC is within 2 of the lowest, among those that converged.
+    """The name of the preferred model: the simplest whose AIC is within 2 of the lowest, among those that converged
+    (fewest parameters; of two alike, linear drag).
 
-    A small-angle model is preferred only where every full-sine model is worse by more than 2: with as many parameters the
-    full sine is the exact equation, and a free ω_g can hide what small angles get wrong.
+    A small-angle model is preferred only where every full-sine model is worse by more than 2 and its own ω_g is not off by
+    what the finite swing does to the period: the full sine is the exact equation with as many parameters, and a free ω_g
+    can hide what small angles get wrong.
     """
     if not fits:
         raise UsageError("there are no fits to choose from; fit at least one model")
     good = {name: result for name, result in fits.items() if result.success} or dict(fits)
+    sound = {name: result for name, result in good.items() if not _too_large(result)}
+    good = sound if any(name.startswith("full") for name in sound) else good
     lowest = min(result.aic for result in good.values())
     near = [name for name, result in good.items() if result.aic <= lowest + 2]
     exact = [name for name in near if name.startswith("full")]
-    return min(exact or near or list(good), key=lambda name: (len(good[name].free), good[name].aic))
+    by_simplicity = {name: (len(good[name].free), not name.endswith("linear_drag"), good[name].aic) for name in good}
+    return min(exact or near or list(good), key=lambda name: by_simplicity[name])
+
+
+def _too_large(result: FitResult) -> bool:
+    """Whether a small-angle model's swing lengthens the period, by A²/16, by more than twice what ω_g is known to."""
+    if not result.model.startswith("small_angle"):
+        return False
+    omega = result.parameters.get("omega_g") or result.derived.get("omega_g")
+    if omega is None or not omega.stderr:
+        return False
+    offset = result.parameters["theta_offset"].value if "theta_offset" in result.parameters else 0.0
+    return float(np.max(np.abs(result.theta_rad - offset))) ** 2 / 16 > 2 * omega.stderr / omega.value
 
 
 def _freed_length(

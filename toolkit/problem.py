@@ -52,6 +52,8 @@ class Problem:
 
     values : name -> value held or to start from.    free : names fitted, in order.    priors : name -> (mean, u) of
     nuisance and other parameters measured beforehand; each adds one residual.    sigma : (n,) weights' σ.
+    prior_weight : how much the points overstate what they know (correlated residuals): the priors count that much more.
+    prior_scale : the points' true σ over `sigma`, where that is not known beforehand.
     """
 
     series: ThetaSeries
@@ -65,6 +67,8 @@ class Problem:
     loss: str = "linear"
     time_sigma_s: float = 0.0
     shift_s: float = 0.0
+    prior_weight: float = 1.0
+    prior_scale: float = 1.0
     _last: dict[Any, Any] = field(init=False, default_factory=dict, repr=False, compare=False)
 
     @property
@@ -200,7 +204,28 @@ class Problem:
                 break
         if not attempts:
             return self._failed("the equation could not be solved from any start; check the times and angles", None)
-        return self._report(min(attempts, key=lambda a: a.cost))
+        best = min(attempts, key=lambda a: a.cost)
+        return self._weighed(best, self._report(best))
+
+    def _weighed(self, found: Solved, result: FitResult) -> FitResult:
+        """The fit once more where points and priors were not weighed as the residuals say: points with correlated noise, or
+        of unknown σ, would else pull a parameter off its prior, or be held by it, with a weight that is not theirs."""
+        weight = float(result.noise["inflation"])
+        scale = 1.0 if self.sigma_known else float(result.noise["sigma_rad"])
+        if not self.priors or not result.success or not (weight * scale > 0) or 0.8 < weight * scale < 1.25:
+            return result
+        values = dict(found.values)
+        if "angle_scale" in values:
+            values["theta0"] *= 1 + values["angle_scale"]
+        values |= {name: mean for name, (mean, _) in self.priors.items()}
+        again = replace(self, prior_weight=weight, prior_scale=scale)
+        better = again._descend_bounded(values)
+        return result if better is None or not better.success else again._report(better)
+
+    def _prior_precision(self) -> np.ndarray:
+        """(k,) what the priors add to the diagonal of the normal matrix of the points in units of their σ."""
+        weight2 = self.prior_weight**2
+        return np.array([weight2 / self.priors[name][1] ** 2 if name in self.priors else 0.0 for name in self.free])
 
     def with_input(self, name: str, change: float) -> Problem:
         """The same problem with an input moved: mass, length, g, bob_radius (SI), vertical (rad), angle_scale and
@@ -234,7 +259,7 @@ class Problem:
         _, by, _ = self.predict(values, self.free)
         sigma = self.sigma if self.sigma_known else self.sigma * float(result.noise["sigma_rad"])
         jacobian = by / sigma[:, None]
-        prior = np.array([1 / self.priors[n][1] ** 2 if n in self.priors else 0.0 for n in self.free])
+        prior = self._prior_precision()
         scale = 1 / np.sqrt(np.sum(jacobian**2, axis=0) + prior)
         scaled = jacobian * scale
         inverse = np.linalg.pinv(scaled.T @ scaled + np.diag(prior * scale**2), rcond=1e-15, hermitian=True)
@@ -445,9 +470,10 @@ class Problem:
         residual[: measured.size] = (measured - seen) * weight
         np.multiply(by, -weight[:, None], out=jacobian[: measured.size])
         for i, (name, (mean, u)) in enumerate(self.priors.items(), start=measured.size):
-            residual[i] = (values[name] - mean) / u
+            weight_here = self.prior_weight * self.prior_scale / u
+            residual[i] = (values[name] - mean) * weight_here
             if name in free:
-                jacobian[i, free.index(name)] = 1 / u
+                jacobian[i, free.index(name)] = weight_here
         return residual, jacobian
 
     def _held(self, values: Mapping[str, float]) -> tuple[str, ...]:
@@ -546,6 +572,12 @@ class Problem:
             )
         for name in found.at_zero:
             warnings.append(f"{name} came out negative and is held at its bound 0: the record does not show this drag")
+        for name, (mean, prior_u) in self.priors.items():
+            if name in self.free and abs(values[name] - mean) > 2.5 * prior_u:
+                warnings.append(
+                    f"{name} left what was measured beforehand by {abs(values[name] - mean) / prior_u:.1f} of its standard "
+                    "uncertainties: the record contradicts it, or the model is not the one for this record"
+                )
         chi2 = float(normalised @ normalised)
         inflation2 = noise.inflation**2
         success, message = found.success, "the fit converged"
@@ -589,7 +621,7 @@ class Problem:
     def _covariance(self, jacobian: np.ndarray, noise: Any) -> tuple[np.ndarray, list[str]]:
         """(k, k) covariance that allows for the noise and the priors, and the names that the record cannot fix."""
         size = np.linalg.norm(jacobian, axis=0)
-        prior = np.array([1 / self.priors[name][1] ** 2 if name in self.priors else 0.0 for name in self.free])
+        prior = self._prior_precision()
         scale = 1 / np.sqrt(size**2 + prior)
         blind = [name for name, s in zip(self.free, scale) if not math.isfinite(s)]
         if blind:
@@ -600,7 +632,7 @@ class Problem:
         singular = eigenvalue[0] < 1e-13 * eigenvalue[-1]
         eigenvalue = np.maximum(eigenvalue, 1e-15 * eigenvalue[-1])
         inverse = (vector / eigenvalue) @ vector.T
-        middle = spread(scaled, noise) + np.diag(prior * scale**2)
+        middle = spread(scaled, noise) + np.diag(prior * (self.prior_weight * scale) ** 2)
         covariance = (inverse @ middle @ inverse) * np.outer(scale, scale)
         covariance = (covariance + covariance.T) / 2
         loose = [self.free[i] for i in np.flatnonzero(np.abs(vector[:, 0]) > 0.3)] if singular else []
