@@ -97,6 +97,15 @@ def test_papers_model_in_every_regime(alpha):
     assert result.reduced_chi2 < 1.5
 
 
+@pytest.mark.parametrize("alpha", [4.43, 4.429])
+def test_critical_damping_is_fitted_or_said(alpha):
+    series = swing(theta0=0.05, alpha_d=alpha, small_angle=True, duration_s=4, noise_rad=1e-5, offset=0.0, phi=1.0)
+    for held in ({}, {"omega_g": 4.43, "theta_offset": 0.0}):
+        result = fit(series, model="small_angle_linear_drag", fixed=held)
+        assert (result.success and result.reduced_chi2 < 1.5) or "near critical" in result.message
+        assert np.all(np.isfinite(result.covariance))
+
+
 def test_paper_with_given_length_fits_k_d_theta0_phi():
     series = swing(theta0=0.03, omega_g=OMEGA, alpha_d=0.32, small_angle=True, noise_rad=1e-4)
     scene = Scene(pendulum=Pendulum(mass_kg=0.25, length_m=0.5))

@@ -103,7 +103,8 @@ def budget(
     prior2 = 0.0
     for name, (mean, u) in priors.items():
         i = result.free.index(name)
-        sensitivity = float(gradient @ result.problem.normal_inverse(result)[:, i]) / u**2
+        pull = result.problem.prior_weight**2 / u**2
+        sensitivity = float(gradient @ result.problem.normal_inverse(result)[:, i]) * pull
         rows.append(
             Row(
                 name,

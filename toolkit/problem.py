@@ -587,6 +587,11 @@ class Problem:
                 f"the record cannot fix {', '.join(singular)}: the covariance is singular; "
                 "fit a simpler model or record for longer"
             )
+        elif not found.success and self._nearly_critical(reduced):
+            message = (
+                "the damping is near critical, where the paper's decaying sine has no frequency left to tell amplitude and phase "
+                "by; use a full-sine model, which starts from θ(0) and θ̇(0), or give the length so that ω_g is held"
+            )
         elif not found.success:
             message = f"the fit did not settle ({found.lmfit.message.strip()}); give a start value or a shorter stretch"
         elif not self._good(found) and not self.model.small_angle:
@@ -617,6 +622,13 @@ class Problem:
             problem=self,
         )
         return replace(result, derived=derive(result, self))
+
+    def _nearly_critical(self, reduced: Mapping[str, float]) -> bool:
+        """Whether the closed form is asked for a motion that hardly swings back, by the fit or by the first guess."""
+        if not self.model.closed_form:
+            return False
+        first = self._guess()
+        return reduced["alpha_d"] > 0.7 * reduced["omega_g"] or first.alpha_d > 0.7 * first.omega_g
 
     def _covariance(self, jacobian: np.ndarray, noise: Any) -> tuple[np.ndarray, list[str]]:
         """(k, k) covariance that allows for the noise and the priors, and the names that the record cannot fix."""
