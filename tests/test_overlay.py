@@ -82,7 +82,7 @@ def test_lost_frames_and_the_model(tmp_path, filmed):
     status[4:7] = "lost"
     track = replace(track, x_px=x, y_px=y, status=status)
     theta = np.arctan2(x - 80.0, y - 20.0) + 0.3  # its zero is elsewhere: that must not matter
-    for model in (theta, theta[status != "lost"]):
+    for model in (theta, theta[status == "ok"]):
         frames = decode(write_overlay(path, track, tmp_path / "overlay.mp4", model))
         row = 12  # the arm of the cross beside the bob is purple
         mark = frames[row][round(y[row]), round(x[row] + track.radius_px + 3)].astype(int)

@@ -33,7 +33,7 @@ def write_overlay(
 ) -> Path:
     """Draw `track` on its video and write H.264 (yuv420p, plays anywhere) to out_path, whole or not at all.
 
-    theta_model_rad : a model's θ in rad, one a frame of the track or one a frame that is not lost (the rows of
+    theta_model_rad : a model's θ in rad, one a frame of the track or one a frame that was measured (the rows of
     theta.csv); its zero is put where it fits the track best. Frames that the track did not use are left out.
     The pivot may lie outside the picture. Raises UsageError if lengths differ or out_path is not a video's
     name, JobError if the video holds none of the track's frames.
@@ -59,7 +59,7 @@ def write_overlay(
             scratch,
             *size,
             rate,
-            {"name": "h264", "crf": 23},
+            {"name": "h264", "crf": 23, "effort": "least"},
             even=out_path.suffix.lower() == ".avi",
         ) as film,
     ):
@@ -95,15 +95,14 @@ def _model_px(track: Track, theta_rad: np.ndarray | None) -> np.ndarray | None:
     if theta_rad is None:
         return None
     theta = np.asarray(theta_rad, dtype=float)
-    seen = track.status != "lost"
-    if theta.shape == (int(seen.sum()),):
+    if theta.shape == (int(track.ok.sum()),):
         full = np.full(track.frame.size, np.nan)
-        full[seen] = theta
+        full[track.ok] = theta
         theta = full
     if theta.shape != track.frame.shape:
         raise UsageError(
-            f"theta_model_rad must have one value a frame ({track.frame.size}) or a frame that is not lost "
-            f"({int(seen.sum())}), got shape {np.shape(theta_rad)}"
+            f"theta_model_rad must have one value a frame ({track.frame.size}) or a measured frame "
+            f"({int(track.ok.sum())}), got shape {np.shape(theta_rad)}"
         )
     dx, dy = track.x_px - track.pivot_px[0], track.y_px - track.pivot_px[1]
     vertical = np.nanmedian(np.angle(np.exp(1j * (np.arctan2(dx, dy) - theta))))
