@@ -1,6 +1,7 @@
 """How well tracking does, on films with exact truth.
 
     python benchmarks/tracking.py accuracy            the conditions of the accuracy list, 720p, beside the Cramér–Rao bound
+    python benchmarks/tracking.py speed [VIDEO]       CPU time: search, localiser, whole tracking beside decoding alone; memory
     python benchmarks/tracking.py scenes [--count 216] [--first 0] [--keep FOLDER]
                                                       random scenes over all camera effects: locked, silent failures, σ
 
@@ -334,6 +335,53 @@ def _print_accuracy(o: Outcome, limit: float) -> None:
     )
 
 
+# --- speed -----------------------------------------------------------------------------------------------------------
+
+
+def run_speed(video: Path) -> None:
+    """CPU time of the search, of the localiser a frame and of whole tracking, beside decoding alone; peak memory."""
+    from toolkit.acquire import find_bob
+    from toolkit.track import _begin, _read_ahead
+    from toolkit.trackers import load_tracker
+    from toolkit.video import open_video
+
+    def cpu(job: Callable[[], Any]) -> tuple[float, Any]:
+        began = time.process_time()
+        result = job()
+        return time.process_time() - began, result
+
+    track(video, stop_s=2.0)  # whatever is compiled is compiled
+    decode, frames = cpu(lambda: sum(1 for _ in open_video(video)))
+    whole, found = cpu(lambda: track(video))
+    batch = _read_ahead(iter(open_video(video)))
+    search, _ = cpu(lambda: find_bob(batch, None, None, str(video)))
+    follower, _ = _begin(open_video(video), None, None, None, None, None, None)
+    frame = batch[len(batch) // 2]
+    x, y, vx, vy = follower._expect(frame.t_s)
+    guess = follower._guess(x, y, vx * follower.exposure_s, vy * follower.exposure_s)
+    patch = follower._patch(frame, follower.look, guess)
+    assert patch is not None
+    locate = load_tracker("disc").locate
+    fit, _ = cpu(lambda: [locate(patch, follower.look, guess) for _ in range(2000)])
+    begin, _ = cpu(lambda: _begin(open_video(video), None, None, None, None, None, None))
+    print(
+        f"{video.name}: {found.meta['width_px']}x{found.meta['height_px']}, {frames} frames, ok {found.ok.mean():.1%}"
+    )
+    print(f"search for the bob        {search:.3f} s CPU ({len(batch)} frames in memory; limit 0.3)")
+    print(f"search and looks learned  {begin:.3f} s CPU (decoding of these frames included)")
+    print(f"localiser                 {fit / 2000 * 1e6:.0f} us a frame (limit 50 at 720p)")
+    print(f"decoding alone            {decode / frames * 1e6:.0f} us a frame")
+    print(
+        f"whole tracking            {whole / frames * 1e6:.0f} us a frame: {decode / whole:.2f} of the decoding rate (limit 0.90)"
+    )
+    try:
+        import resource
+
+        print(f"peak memory               {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
+    except ImportError:
+        pass
+
+
 # --- summary ---------------------------------------------------------------------------------------------------------
 
 
@@ -386,7 +434,8 @@ def describe(o: Outcome) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
-    parser.add_argument("what", choices=["accuracy", "scenes"])
+    parser.add_argument("what", choices=["accuracy", "scenes", "speed"])
+    parser.add_argument("video", type=Path, nargs="?", help="for speed; by default a 10 s 720p clip is rendered")
     parser.add_argument("--count", type=int, default=8 * len(effect_names()))
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--numbers", type=int, nargs="*", help="these scenes only")
@@ -396,6 +445,14 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         folder = asked.keep or Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
+        if asked.what == "speed":
+            film = asked.video
+            if film is None:
+                film = folder / "speed.mp4"
+                mbit8 = {"sensor_noise": {"read_sigma": 2.0}, "codec": {"name": "h264", "bit_rate_bit_per_s": 8e6}}
+                render(accuracy_scene(mbit8, {}, 10.0), film)
+            run_speed(film)
+            return
         if asked.what == "accuracy":
             outcomes = [outcome for outcome, _ in run_accuracy(folder)]
         else:

@@ -420,7 +420,7 @@ def _clock_slips(t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, go
     leap, off, bent = np.zeros(chosen.size), np.full(chosen.size, np.inf), np.zeros(chosen.size)
     for i in range(n, chosen.size - n):
         a, b = chosen[i - n : i], chosen[i : i + n]
-        if b[-1] - a[0] > 3 * n:
+        if b[-1] - a[0] > 3 * n or abs(ahead[b[0]] - ahead[a[-1]]) < 0.5:
             continue
         middle = 0.5 * (a[-1] + b[0])
         before, after = (np.polyfit(p - middle, ahead[p], 1) for p in (a, b))
