@@ -155,8 +155,8 @@ def _draw(picture: np.ndarray, track: Track, row: int, model: np.ndarray | None,
     if model is not None and np.all(np.isfinite(model[row])):
         x, y = model[row]
         arm = (radius + 5 * thick) / scale
-        line([[x - arm, y], [x + arm, y]], _MODEL_RGB, thick)
-        line([[x, y - arm], [x, y + arm]], _MODEL_RGB, thick)
+        line([[x - arm, y], [x + arm, y]], _MODEL_RGB, 2 * thick)
+        line([[x, y - arm], [x, y + arm]], _MODEL_RGB, 2 * thick)
     _caption(picture, f"{track.t_s[row]:7.3f} s  frame {track.frame[row]}  {status}", thick)
 
 
