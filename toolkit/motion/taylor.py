@@ -296,7 +296,7 @@ def integrate(
             D[a * ROW] = _value(skip(D, a * ROW), n if a < 2 * k_sens else rough, h)
         power = 0.3 * SAFETY * h ** (n - 1)
         seed = (seed * 1103515245 + 12345) % 2147483648
-        rounding = 4.4e-16 if seed < 1073741824 else -4.4e-16  # rounding errors add like a random walk
+        rounding = 2.2e-16 if seed < 1073741824 else -2.2e-16  # rounding errors add like a random walk
         for a in range(2):
             series = skip(W, a * ROW)
             change = h * _value(skip(series, 1), n - 1, h) + lost[a]
