@@ -24,9 +24,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from toolkit.cycles import amplitude_of, cycles, period_of
 from toolkit.diagnose import diagnose
 from toolkit.fit import FitResult, choose_model, fit, fit_models
+from toolkit.fitting.cycles import amplitude_of, cycles, period_of
 from toolkit.models import load_model
 from toolkit.scene import Pendulum, Scene
 from toolkit.series import ThetaSeries

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from synthetic_swing import swing
 
-from toolkit.cycles import amplitude_of, cycles, period_of, residual_autocorrelation, residual_spectrum
 from toolkit.fit import fit
+from toolkit.fitting.cycles import amplitude_of, cycles, period_of, residual_autocorrelation, residual_spectrum
 
 
 def test_periods_follow_the_exact_law():

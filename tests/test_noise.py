@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from toolkit import noise
+from toolkit.fitting import noise
 
 
 def ar1(n: int, rho: float, seed: int = 0) -> np.ndarray:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from synthetic_swing import swing
 
-from toolkit.budget import Input, budget
 from toolkit.errors import UsageError
 from toolkit.fit import fit
+from toolkit.fitting.budget import Input, budget
+from toolkit.fitting.uncertainty import bands, bootstrap, profile, sample_posterior, small_angle_bias
 from toolkit.scene import Pendulum, Scene
 from toolkit.series import ThetaSeries
-from toolkit.uncertainty import bands, bootstrap, profile, sample_posterior, small_angle_bias
 
 SCENE = Scene(pendulum=Pendulum(mass_kg=0.05, length_m=0.5))
 

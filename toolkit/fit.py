@@ -41,7 +41,7 @@ class FitResult:
     success False comes with a `message` that says what happened and the remedy; nothing is raised.
     noise : sigma_rad used, where it came from, residual autocorrelation (rho1), inflation of the error bars.
     derived : name -> FittedParameter of what follows from the parameters (T0_s, Q, length_m …).
-    lmfit : lmfit's own MinimizerResult.    problem : what was solved (`toolkit.problem.Problem`), to solve it again.
+    lmfit : lmfit's own MinimizerResult.    problem : what was solved (`toolkit.fitting.problem.Problem`), to solve it again.
     """
 
     model: str
@@ -100,11 +100,11 @@ def fit(
     time_sigma_s : standard uncertainty of each time; it adds (σ_t θ̇)² to each σ².
     thorough : False takes the first start that converges, without looking whether the model then follows the record.
 
-    Drag coefficients are ≥ 0. Error bars allow for correlated residuals (see `toolkit.noise`). Poor data gives a
+    Drag coefficients are ≥ 0. Error bars allow for correlated residuals (see `toolkit.fitting.noise`). Poor data gives a
     result with success False, a message and a remedy. Raises UsageError for unknown names or a scene that lacks what
     the model needs.
     """
-    from toolkit.problem import pose
+    from toolkit.fitting.problem import pose
 
     began = time.process_time()
     problem = pose(series, scene or Scene(), model, free, fixed or {}, priors, loss, time_sigma_s)

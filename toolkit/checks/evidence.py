@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolkit.fit import FitResult, fit
-from toolkit.noise import Noise, measure_noise
+from toolkit.fitting.noise import Noise, measure_noise
 from toolkit.scene import Scene
 from toolkit.series import ThetaSeries
 

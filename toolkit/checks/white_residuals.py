@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.checks.evidence import Evidence, omega_g_of
 from toolkit.checks.finding import FAILS, HOLDS, NOT_DISTINGUISHABLE, Finding
-from toolkit.cycles import residual_spectrum
+from toolkit.fitting.cycles import residual_spectrum
 
 _FEWEST = 40
 

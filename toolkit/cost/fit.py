@@ -141,7 +141,7 @@ def by_points(counts: tuple[int, ...], progress: Progress = silent) -> list[Resu
 
 def error_methods(quick: bool = False, progress: Progress = silent) -> list[Result]:
     """CPU of each road to an error bar on one record; excess_chi2 holds u(β) over the covariance's own."""
-    from toolkit.uncertainty import bootstrap, profile, sample_posterior
+    from toolkit.fitting.uncertainty import bootstrap, profile, sample_posterior
 
     series = record(1201, 20.0)
     result = fit(series, model=MODEL)

@@ -417,7 +417,7 @@ _BY_CLOCK = {
 def _budget_table(material: Material, result: FitResult, name: str) -> Table | None:
     from scipy.stats import t as student
 
-    from toolkit.budget import Row, budget
+    from toolkit.fitting.budget import Row, budget
 
     words, environment = material.words, material.analysis.scene.environment
     try:

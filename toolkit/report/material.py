@@ -14,8 +14,8 @@ from toolkit.report.words import Words
 
 if TYPE_CHECKING:
     from toolkit.analyse import Analysis
-    from toolkit.cycles import Cycles
     from toolkit.fit import FitResult, FittedParameter
+    from toolkit.fitting.cycles import Cycles
 
 PAPER = "small_angle_linear_drag"
 
@@ -95,7 +95,7 @@ class Material:
     @cached_property
     def cycles(self) -> Cycles | None:
         """Amplitude and period of each swing, None where there are fewer than three."""
-        from toolkit.cycles import cycles
+        from toolkit.fitting.cycles import cycles
 
         found = cycles(self.analysis.series, self.best if self.best.success else None)
         return found if found.t_s.size >= 3 else None
@@ -110,7 +110,7 @@ class Material:
 
     def problem(self, result: FitResult) -> Any | None:
         """What was solved for `result`, to evaluate its motion at other times; None where that is not possible."""
-        from toolkit.problem import pose
+        from toolkit.fitting.problem import pose
 
         if result.problem is not None:
             return result.problem

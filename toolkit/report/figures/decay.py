@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.cycles import Cycles, amplitude_of
+from toolkit.fitting.cycles import Cycles, amplitude_of
 from toolkit.report.document import Figure
 from toolkit.report.material import Material, value
 from toolkit.report.style import BEST_MODEL, DATA, PAPER_MODEL, dots, draw, panels

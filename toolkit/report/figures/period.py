@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.cycles import period_of
+from toolkit.fitting.cycles import period_of
 from toolkit.report.document import Figure
 from toolkit.report.material import Material, binned, value
 from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, dots, draw, panels

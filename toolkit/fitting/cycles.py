@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.guess import crossing_times, frequency_ratio, point_noise
-from toolkit.noise import autocorrelation
+from toolkit.fitting.guess import crossing_times, frequency_ratio, point_noise
+from toolkit.fitting.noise import autocorrelation
 
 if TYPE_CHECKING:
     from toolkit.fit import FitResult

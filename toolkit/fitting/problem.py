@@ -11,10 +11,10 @@ import numpy as np
 
 from toolkit.errors import PendulabError, UsageError
 from toolkit.fit import FitResult, FittedParameter
-from toolkit.guess import Guess, guess, guess_from_integrals, point_noise
+from toolkit.fitting.guess import Guess, guess, guess_from_integrals, point_noise
+from toolkit.fitting.noise import measure_noise, spread
 from toolkit.models import load_model
 from toolkit.models.model import Model, Motion
-from toolkit.noise import measure_noise, spread
 from toolkit.registry import did_you_mean
 
 if TYPE_CHECKING:
@@ -543,7 +543,7 @@ class Problem:
         return wanted if gains[wanted] > 1e-3 * found.cost / residual.size else None
 
     def _report(self, found: Solved) -> FitResult:
-        from toolkit.derived import derive
+        from toolkit.fitting.derived import derive
 
         values = _tidied(found.values, self.model.small_angle)
         seen, by, motion = self.predict(values, self.free)

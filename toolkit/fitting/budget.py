@@ -158,7 +158,7 @@ def _gradient(result: FitResult, quantity: str) -> np.ndarray:
     """Derivatives of the quantity by the free parameters (exact for a parameter, numerical for a derived one)."""
     if quantity in result.free:
         return np.eye(len(result.free))[result.free.index(quantity)]
-    from toolkit.derived import derive
+    from toolkit.fitting.derived import derive
 
     values = {name: p.value for name, p in result.parameters.items()}
     gradient = np.zeros(len(result.free))

@@ -10,7 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from toolkit.fit import FitResult, FittedParameter
-    from toolkit.problem import Problem
+    from toolkit.fitting.problem import Problem
 
 
 def propagate(result: FitResult, function: Callable[[dict[str, float]], float], unit: str) -> FittedParameter:
