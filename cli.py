@@ -503,6 +503,9 @@ def _progress() -> Iterator[Progress]:
         def show(stage: str, fraction: float) -> None:
             bar.update(task, description=stage, completed=fraction)
 
+        from toolkit.motion import compiled
+
+        compiled.listener = lambda sentence: show(sentence, 0.0)
         yield show
 
 
