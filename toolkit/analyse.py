@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.checks.finding import Finding
+from toolkit.compile_ahead import compile_ahead
 from toolkit.errors import JobError, UsageError
 from toolkit.fit import FitResult
 from toolkit.progress import Progress, silent
@@ -126,7 +127,16 @@ def analyse(
         timings[stage] = now - clock
         clock = now
 
-    series, found = measure(path, scene, progress=progress, **measuring)
+    ahead = compile_ahead() if is_video(path) else None
+    try:
+        series, found = measure(path, scene, progress=progress, **measuring)
+    except BaseException:
+        if ahead is not None:
+            ahead.kill()
+        raise
+    if ahead is not None:
+        progress("compiling the equations, this once", 0.0)
+        ahead.wait()
     scene = _with_what_the_recording_says(scene, series)
     stage_done("measure")
     from toolkit.diagnose import diagnose

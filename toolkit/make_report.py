@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +39,17 @@ def make_report(
         analysis = analyse(recording, scene, models=models, progress=progress, **measuring)
         write_analysis(analysis, folder)
         progress("writing the report", 0.0)
-        written = write_report(build_report(analysis, lang=lang), folder, formats)
-        if overlay and analysis.track is not None and analysis.video is not None:
-            from toolkit.overlay import write_overlay
-
-            write_overlay(analysis.video, analysis.track, folder / "overlay.mp4", analysis.best.theta_rad, progress)
+        with ThreadPoolExecutor(1) as beside:  # encoding a film leaves Python free to draw figures
+            film = beside.submit(_write_film, analysis, folder) if overlay else None
+            written = write_report(build_report(analysis, lang=lang), folder, formats)
+            if film is not None:
+                progress("writing the overlay", 0.5)
+                film.result()
     return analysis, [out / path.name for path in written]
+
+
+def _write_film(analysis: Analysis, folder: Path) -> None:
+    if analysis.track is not None and analysis.video is not None:
+        from toolkit.overlay import write_overlay
+
+        write_overlay(analysis.video, analysis.track, folder / "overlay.mp4", analysis.best.theta_rad)

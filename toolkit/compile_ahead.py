@@ -1,0 +1,51 @@
+"""Compile the ladder's equations on another processor while a video is being tracked, the first time only."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+
+def compile_ahead() -> subprocess.Popen[bytes] | None:
+    """Start a process that fits every model of the ladder to a made-up swing, so that their code is on the disk.
+
+    None where that was done before by these versions, or where no second Python can be started. Wait for the process
+    before fitting: what it compiles need not be compiled twice.
+    """
+    if not sys.executable or _mark().exists():
+        return None
+    package = str(Path(__file__).resolve().parents[1])
+    code = (
+        f"import sys; sys.path.insert(0, {package!r}); from toolkit.compile_ahead import fit_a_made_up_swing as f; f()"
+    )
+    quiet = subprocess.DEVNULL
+    try:
+        return subprocess.Popen([sys.executable, "-c", code], stdin=quiet, stdout=quiet, stderr=quiet)
+    except OSError:
+        return None
+
+
+def fit_a_made_up_swing() -> None:
+    """Fit and judge a short noisy swing with all kinds of drag: whatever a report compiles is then compiled."""
+    import numpy as np
+
+    from toolkit.diagnose import diagnose
+    from toolkit.fit import fit_models
+    from toolkit.series import ThetaSeries
+
+    t_s = np.arange(0, 6, 1 / 60)
+    theta_rad = 0.6 * np.exp(-0.05 * t_s) * np.cos(4.6 * t_s) + np.random.default_rng(0).normal(0, 1e-3, t_s.size)
+    series = ThetaSeries(t_s, theta_rad, np.full(t_s.size, 1e-3))
+    diagnose(series, fit_models(series))
+    _mark().touch()
+
+
+def _mark() -> Path:
+    from importlib.metadata import version
+
+    from toolkit import __version__
+    from toolkit.motion.compiled import cache_folder, key_of
+
+    versions = (__version__, version("numba"), version("numpy"), sys.version, str(Path(__file__).resolve()))
+    return cache_folder() / f"ready-{key_of(*versions)}"
