@@ -50,7 +50,13 @@ def test_the_worked_example_runs(table_magnet):
 
 def test_its_sensitivities_come_with_it(table_magnet):
     equation = build_equation(["table_magnet"])
-    p = {"mass_kg": 0.25, "length_m": 0.5, "g_m_per_s2": 9.8, "table_magnet.depth_j": 0.05, "table_magnet.width_rad": 0.1}
+    p = {
+        "mass_kg": 0.25,
+        "length_m": 0.5,
+        "g_m_per_s2": 9.8,
+        "table_magnet.depth_j": 0.05,
+        "table_magnet.width_rad": 0.1,
+    }
     t = np.linspace(0, 2, 5)
     solved = equation.solve(p, 0.3, 0.0, t, 1e-12, ["table_magnet.depth_j"])
     h = 1e-5

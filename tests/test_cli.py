@@ -281,7 +281,21 @@ def test_batch_makes_one_report_a_recording_and_goes_on_past_a_bad_one(tmp_path)
 def test_help_of_every_command():
     listing = pendulab("--help")
     assert listing.returncode == 0
-    for command in ["demo", "track", "fit", "report", "simulate", "render", "cost", "paper", "batch", "convert", "effects", "models", "trackers"]:
+    for command in [
+        "demo",
+        "track",
+        "fit",
+        "report",
+        "simulate",
+        "render",
+        "cost",
+        "paper",
+        "batch",
+        "convert",
+        "effects",
+        "models",
+        "trackers",
+    ]:
         assert command in listing.stdout
         assert pendulab(command, "--help").returncode == 0
 
