@@ -23,18 +23,20 @@ def whole_folder(folder: str | Path) -> Iterator[Path]:
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"{folder} is a file; --out needs a folder: give another name")
     missing = [p for p in (folder, *folder.parents) if not p.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        scratch = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
-    except OSError as error:
-        raise UsageError(f"cannot write into {folder}: {error.strerror}; choose another folder") from error
+    scratch: Path | None = None
     done = False
-    try:
+    try:  # from here on, so that a Ctrl-C while the folder is being made leaves nothing either
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            scratch = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
+        except OSError as error:
+            raise UsageError(f"cannot write into {folder}: {error.strerror}; choose another folder") from error
         yield scratch
         _move_all(scratch, folder)
         done = True
     finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        if scratch is not None:
+            shutil.rmtree(scratch, ignore_errors=True)
         if not done:
             for made in missing:  # innermost first: only folders that this call made, and only if still empty
                 try:
