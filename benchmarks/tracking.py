@@ -340,9 +340,9 @@ def _print_accuracy(o: Outcome, limit: float) -> None:
 
 def run_speed(video: Path) -> None:
     """CPU time of the search, of the localiser a frame and of whole tracking, beside decoding alone; peak memory."""
-    from toolkit.acquire import find_bob
     from toolkit.track import _begin, _read_ahead
     from toolkit.trackers import load_tracker
+    from toolkit.tracking.acquire import find_bob
     from toolkit.video import open_video
 
     def cpu(job: Callable[[], Any]) -> tuple[float, Any]:

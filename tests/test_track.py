@@ -9,8 +9,8 @@ import pytest
 
 from toolkit.calibrate import arc_pivot, calibrate, line_pivot, write_calibration_json
 from toolkit.errors import JobError, UsageError
-from toolkit.swing import NAMES, fit_circle, fit_swing
 from toolkit.track import OK, PREDICTED, track, write_track_csv
+from toolkit.tracking.swing import NAMES, fit_circle, fit_swing
 
 av = pytest.importorskip("av")
 cv2 = pytest.importorskip("cv2")
@@ -156,7 +156,7 @@ def test_swing_fit_recovers_its_own_motion():
     t = np.arange(0, 6, 1 / 60)
     truth = np.array([320, -100, 400, 0.01, 9.0, 0.01, 0.02, 0.35, 0.1])
     start = truth * 1.02
-    from toolkit.swing import Swing
+    from toolkit.tracking.swing import Swing
 
     x, y = Swing(truth, np.zeros((9, 9)), 0.0, 0.0).position(t)
     rng = np.random.default_rng(1)

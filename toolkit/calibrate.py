@@ -20,8 +20,8 @@ from toolkit.errors import JobError, UsageError
 from toolkit.output import whole_file
 from toolkit.scene import Scene
 from toolkit.series import ThetaSeries
-from toolkit.swing import fit_circle, fit_swing, start_swing
 from toolkit.track import LOST, PREDICTED, Track
+from toolkit.tracking.swing import fit_circle, fit_swing, start_swing
 
 _CLICK_SIGMA_PX = 1.0
 # What one picture plane cannot tell, as standard uncertainties of the scale of all angles. Alone, an arc or a string hides a

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.acquire import REMEDY, find_bob
 from toolkit.errors import JobError, UsageError
-from toolkit.follow import Follower, Record
 from toolkit.output import whole_file
 from toolkit.progress import Progress, silent
-from toolkit.stillness import CameraShift
-from toolkit.swing import Swing, fit_swing
 from toolkit.trackers import load_tracker
+from toolkit.tracking.acquire import REMEDY, find_bob
+from toolkit.tracking.follow import Follower, Record
+from toolkit.tracking.stillness import CameraShift
+from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
@@ -554,7 +554,7 @@ def _even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:
 
 
 def _at_first_measured(swing: Swing, t: np.ndarray, good: np.ndarray, fps_factor: float) -> list[float]:
-    """The fitted motion's values (the order of `toolkit.swing.NAMES`) with the state at the first measured frame."""
+    """The fitted motion's values (the order of `toolkit.tracking.swing.NAMES`) with the state at the first measured frame."""
     theta, rate = swing.angle(t[good][:1])
     values = swing.values.copy()
     values[7:] = theta[0], rate[0] * fps_factor

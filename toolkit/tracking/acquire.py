@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from toolkit.errors import JobError, UsageError
-from toolkit.search import Hypothesis, even_light, find_round_movers
-from toolkit.sight import LUMA, Sight, best_sight, small_planes
-from toolkit.swing import Swing, fit_swing, start_swing
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
+from toolkit.tracking.search import Hypothesis, even_light, find_round_movers
+from toolkit.tracking.sight import LUMA, Sight, best_sight, small_planes
+from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.video import Frame
 
 REMEDY = "give --bob X,Y (its centre in px on the first frame)"

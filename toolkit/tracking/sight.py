@@ -61,7 +61,7 @@ def small_planes(frame: Frame, factor: int, colour: bool) -> list[np.ndarray]:
     """Shrunken luma, or with `colour` the two shrunken colour planes, all of one size, float32."""
     import cv2
 
-    from toolkit.search import shrink
+    from toolkit.tracking.search import shrink
 
     luma = shrink(frame.luma, factor)
     if not colour:

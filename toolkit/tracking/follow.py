@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from toolkit.acquire import Rough, cut
-from toolkit.background import Background
-from toolkit.stillness import STILL, Anchors, CameraShift
-from toolkit.string_line import measure_string
-from toolkit.swing import Swing, fit_swing
 from toolkit.trackers import load_tracker
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
+from toolkit.tracking.acquire import Rough, cut
+from toolkit.tracking.background import Background
+from toolkit.tracking.stillness import STILL, Anchors, CameraShift
+from toolkit.tracking.string_line import measure_string
+from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Frame
 
 _STRING_EVERY = 3
