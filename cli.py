@@ -177,7 +177,7 @@ def report(
         recording,
         _scene(scene, mass_kg, length_m, bob_radius_m, g),
         out or Path(f"{recording.stem}-report"),
-        formats=tuple(part.strip() for part in format.split(",") if part.strip()),
+        formats=_formats(format),
         lang=lang,
         overlay=overlay,
         models=model,
@@ -295,7 +295,7 @@ def batch(
 
     known = _scene(scene, mass_kg, length_m, bob_radius_m, g)
     out = out or Path(f"{recordings.name}-reports")
-    formats = tuple(part.strip() for part in format.split(",") if part.strip())
+    formats = _formats(format)
     with _progress() as progress:
         rows = analyse_folder(recordings, out, known, lang=lang, formats=formats, jobs=jobs, progress=progress)
     for row in rows:
@@ -311,12 +311,10 @@ def convert(
     target: Annotated[Path, typer.Argument(metavar="OUT")],
 ) -> None:
     """Between the series formats; the endings say which."""
-    from toolkit.output import whole_file
     from toolkit.series_io import read_series, write_series
 
     series = read_series(source)
-    with whole_file(target) as unfinished:
-        write_series(series, unfinished)
+    write_series(series, target)
     _print_warnings(series.meta.get("warnings", ()))
     typer.echo(target)
 
@@ -449,6 +447,10 @@ def _tracking(pivot: str | None, bob: str | None, radius: float | None, fps_fact
         "radius": radius,
         "fps_factor": fps_factor,
     }
+
+
+def _formats(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
 def _point(text: str | None, option: str) -> tuple[float, float] | None:
