@@ -1,11 +1,11 @@
 """The command `pendulab`: parse, call, print. No physics; heavy imports stay inside the commands."""
 
-from __future__ import annotations
-
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,20 +27,6 @@ app = typer.Typer(
 )
 
 Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results (made if need be).")]
-SceneFile = Annotated[Path | None, typer.Option("--scene", help="Scene file (TOML) with what is known.")]
-Mass = Annotated[float | None, typer.Option("--mass-kg", help="Mass of the bob in kg.")]
-Length = Annotated[float | None, typer.Option("--length-m", help="Length from pivot to bob centre in m.")]
-BobRadius = Annotated[float | None, typer.Option("--bob-radius-m", help="Radius of the bob in m.")]
-Gravity = Annotated[float | None, typer.Option("--g", help="Gravitational acceleration in m/s² (default 9.80665).")]
-FpsFactor = Annotated[
-    float,
-    typer.Option("--fps-factor", help="Slow motion: how many times slower the clip plays (8 for 240 shown at 30)."),
-]
-PivotXY = Annotated[str | None, typer.Option("--pivot", metavar="X,Y", help="Pivot in pixels, instead of finding it.")]
-BobXY = Annotated[str | None, typer.Option("--bob", metavar="X,Y", help="Bob in the first frame used, in pixels.")]
-RadiusPx = Annotated[float | None, typer.Option("--radius", help="Radius of the bob in pixels.")]
-Start = Annotated[float | None, typer.Option("--start", help="Use the recording from this time on, in s.")]
-Stop = Annotated[float | None, typer.Option("--stop", help="Use the recording up to this time, in s.")]
 Lang = Annotated[str, typer.Option("--lang", help="Language of the report: en or th.")]
 Formats = Annotated[str, typer.Option("--format", help="Any of html,pdf,tex,md,xlsx, with commas.")]
 Models = Annotated[list[str] | None, typer.Option("--model", help="Fit this model only; may be given again.")]
@@ -48,6 +34,82 @@ Overlay = Annotated[
     bool, typer.Option("--overlay", help="Also write overlay.mp4: track, pivot and model on the video.")
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="Fewer cases, in under a minute.")]
+
+
+def known_scene(
+    scene: Annotated[Path | None, typer.Option("--scene", help="Scene file (TOML) with what is known.")] = None,
+    mass_kg: Annotated[float | None, typer.Option("--mass-kg", help="Mass of the bob in kg.")] = None,
+    length_m: Annotated[float | None, typer.Option("--length-m", help="Length from pivot to bob centre in m.")] = None,
+    bob_radius_m: Annotated[float | None, typer.Option("--bob-radius-m", help="Radius of the bob in m.")] = None,
+    g: Annotated[
+        float | None, typer.Option("--g", help="Gravitational acceleration in m/s² (default 9.80665).")
+    ] = None,
+) -> "Scene":
+    """The scene file's content, or an empty scene, with what the options say put over it."""
+    from dataclasses import replace
+
+    from toolkit.scene import Scene
+
+    known = Scene.from_toml(scene) if scene is not None else Scene()
+    given = {"mass_kg": mass_kg, "length_m": length_m, "bob_radius_m": bob_radius_m}
+    pendulum = replace(known.pendulum, **{name: value for name, value in given.items() if value is not None})
+    environment = known.environment if g is None else replace(known.environment, g_m_per_s2=g, latitude_deg=None)
+    return replace(known, pendulum=pendulum, environment=environment)
+
+
+def stretch(
+    start: Annotated[float | None, typer.Option("--start", help="Use the recording from this time on, in s.")] = None,
+    stop: Annotated[float | None, typer.Option("--stop", help="Use the recording up to this time, in s.")] = None,
+) -> dict[str, Any]:
+    """What part of the recording is used."""
+    return {"start_s": start, "stop_s": stop}
+
+
+def clicks(
+    fps_factor: Annotated[
+        float,
+        typer.Option("--fps-factor", help="Slow motion: how many times slower the clip plays (8 for 240 shown at 30)."),
+    ] = 1.0,
+    pivot: Annotated[
+        str | None, typer.Option("--pivot", metavar="X,Y", help="Pivot in pixels, instead of finding it.")
+    ] = None,
+    bob: Annotated[
+        str | None, typer.Option("--bob", metavar="X,Y", help="Bob in the first frame used, in pixels.")
+    ] = None,
+    radius: Annotated[float | None, typer.Option("--radius", help="Radius of the bob in pixels.")] = None,
+) -> dict[str, Any]:
+    """What the user tells of a video; nothing is in it that was not told."""
+    from toolkit.errors import UsageError
+
+    if not fps_factor > 0:
+        raise UsageError(f"--fps-factor must be positive, got {fps_factor}")
+    if radius is not None and not radius > 0:
+        raise UsageError(f"--radius must be positive, got {radius}")
+    told = {"pivot": _point(pivot, "--pivot"), "bob": _point(bob, "--bob"), "radius": radius}
+    told = {name: value for name, value in told.items() if value is not None}
+    return told if fps_factor == 1.0 else {**told, "fps_factor": fps_factor}
+
+
+def takes(**parts: Callable[..., Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the options of PARTS too; what a part makes of its options arrives as the argument of its name."""
+
+    def add_options(command: Callable[..., None]) -> Callable[..., None]:
+        options = {name: signature(part).parameters for name, part in parts.items()}
+
+        @wraps(command)
+        def run(**given: Any) -> None:
+            for name, part in parts.items():
+                given[name] = part(**{option: given.pop(option) for option in options[name]})
+            command(**given)
+
+        own = [p for name, p in signature(command).parameters.items() if name not in parts]
+        every = own + [p for one in options.values() for p in one.values()]
+        every.sort(key=lambda p: p.default is not Parameter.empty)  # arguments before options
+        run.__signature__ = Signature(every)  # type: ignore[attr-defined]
+        run.__annotations__ = {p.name: p.annotation for p in every}
+        return run
+
+    return add_options
 
 
 @app.callback()
@@ -79,20 +141,13 @@ def demo(out: Out = None, lang: Lang = "en") -> None:
 
 
 @app.command()
+@takes(scene=known_scene, part=stretch, told=clicks)
 def track(
     video: Path,
+    scene: "Scene",
+    part: dict[str, Any],
+    told: dict[str, Any],
     out: Out = None,
-    scene: SceneFile = None,
-    mass_kg: Mass = None,
-    length_m: Length = None,
-    bob_radius_m: BobRadius = None,
-    g: Gravity = None,
-    fps_factor: FpsFactor = 1.0,
-    pivot: PivotXY = None,
-    bob: BobXY = None,
-    radius: RadiusPx = None,
-    start: Start = None,
-    stop: Stop = None,
     localiser: Annotated[str | None, typer.Option("--localiser", help="Use this localiser (see `trackers`).")] = None,
     overlay: Overlay = False,
 ) -> None:
@@ -101,15 +156,11 @@ def track(
     from toolkit.errors import UsageError
     from toolkit.output import whole_folder
 
-    known = _scene(scene, mass_kg, length_m, bob_radius_m, g)
     if not is_video(video):
         raise UsageError(f"{video.name} is a θ(t) file, not a video: use `pendulab fit` or `pendulab report` on it")
     out = out or Path(f"{video.stem}-track")
     with _progress() as progress, whole_folder(out) as folder:
-        series, found = measure(
-            video, known, start_s=start, stop_s=stop, progress=progress, localiser=localiser,
-            **_tracking(pivot, bob, radius, fps_factor),
-        )  # fmt: skip
+        series, found = measure(video, scene, progress=progress, localiser=localiser, **part, **told)
         write_measurement(series, found, folder)
         if overlay and found is not None:
             from toolkit.overlay import write_overlay
@@ -122,66 +173,53 @@ def track(
 
 
 @app.command()
+@takes(scene=known_scene, part=stretch, told=clicks)
 def fit(
     series: Path,
+    scene: "Scene",
+    part: dict[str, Any],
+    told: dict[str, Any],
     out: Out = None,
-    scene: SceneFile = None,
-    mass_kg: Mass = None,
-    length_m: Length = None,
-    bob_radius_m: BobRadius = None,
-    g: Gravity = None,
-    fps_factor: FpsFactor = 1.0,
-    pivot: PivotXY = None,
-    bob: BobXY = None,
-    radius: RadiusPx = None,
-    start: Start = None,
-    stop: Stop = None,
     model: Models = None,
 ) -> None:
     """Fit the models to a θ(t) file (or a video): fit.json, residuals.csv."""
     from toolkit.analyse import analyse, write_analysis
     from toolkit.output import whole_folder
 
-    known = _scene(scene, mass_kg, length_m, bob_radius_m, g)
-    measuring = _measuring(series, start, stop, pivot, bob, radius, fps_factor)
+    _refuse_clicks(series, told)
     out = out or Path(f"{series.stem}-fit")
     with _progress() as progress, whole_folder(out) as folder:
-        analysis = analyse(series, known, models=model, progress=progress, **measuring)
+        analysis = analyse(series, scene, models=model, progress=progress, **part, **told)
         write_analysis(analysis, folder)
     _print_analysis(analysis)
     typer.echo(out / "fit.json")
 
 
 @app.command()
+@takes(scene=known_scene, part=stretch, told=clicks)
 def report(
     recording: Annotated[Path, typer.Argument(metavar="VIDEO|SERIES")],
+    scene: "Scene",
+    part: dict[str, Any],
+    told: dict[str, Any],
     out: Out = None,
-    scene: SceneFile = None,
-    mass_kg: Mass = None,
-    length_m: Length = None,
-    bob_radius_m: BobRadius = None,
-    g: Gravity = None,
-    fps_factor: FpsFactor = 1.0,
-    pivot: PivotXY = None,
-    bob: BobXY = None,
-    radius: RadiusPx = None,
-    start: Start = None,
-    stop: Stop = None,
     lang: Lang = "en",
     format: Formats = "html,pdf",
     model: Models = None,
     overlay: Overlay = False,
 ) -> None:
     """The whole job on a video or a θ(t) file, with report.html and report.pdf."""
+    _refuse_clicks(recording, told)
     _report(
         recording,
-        _scene(scene, mass_kg, length_m, bob_radius_m, g),
+        scene,
         out or Path(f"{recording.stem}-report"),
         formats=_formats(format),
         lang=lang,
         overlay=overlay,
         models=model,
-        **_measuring(recording, start, stop, pivot, bob, radius, fps_factor),
+        **part,
+        **told,
     )
 
 
@@ -278,14 +316,11 @@ def paper(out: Out = None) -> None:
 
 
 @app.command()
+@takes(scene=known_scene)
 def batch(
     recordings: Annotated[Path, typer.Argument(metavar="FOLDER")],
+    scene: "Scene",
     out: Out = None,
-    scene: SceneFile = None,
-    mass_kg: Mass = None,
-    length_m: Length = None,
-    bob_radius_m: BobRadius = None,
-    g: Gravity = None,
     lang: Lang = "en",
     format: Formats = "html,pdf",
     jobs: Annotated[int, typer.Option("--jobs", help="Recordings at once (default: one a processor).")] = 0,
@@ -293,11 +328,10 @@ def batch(
     """A class at once: one report a recording, summary.csv and index.html."""
     from toolkit.batch import analyse_folder
 
-    known = _scene(scene, mass_kg, length_m, bob_radius_m, g)
     out = out or Path(f"{recordings.name}-reports")
     formats = _formats(format)
     with _progress() as progress:
-        rows = analyse_folder(recordings, out, known, lang=lang, formats=formats, jobs=jobs, progress=progress)
+        rows = analyse_folder(recordings, out, scene, lang=lang, formats=formats, jobs=jobs, progress=progress)
     for row in rows:
         typer.echo(f"{row.recording}: {row.sentence}")
     typer.echo(out / "index.html")
@@ -385,7 +419,7 @@ def _fail(sentence: str, code: int, tail: str = "") -> None:
     sys.exit(code)
 
 
-def _report(recording: Path, scene: Scene, out: Path, **choices: Any) -> None:
+def _report(recording: Path, scene: "Scene", out: Path, **choices: Any) -> None:
     from toolkit.make_report import make_report
 
     with _progress() as progress:
@@ -395,58 +429,13 @@ def _report(recording: Path, scene: Scene, out: Path, **choices: Any) -> None:
         typer.echo(path)
 
 
-def _scene(
-    path: Path | None,
-    mass_kg: float | None,
-    length_m: float | None,
-    bob_radius_m: float | None,
-    g: float | None,
-) -> Scene:
-    """The scene file's content, or an empty scene, with what the options say put over it."""
-    from dataclasses import replace
-
-    from toolkit.scene import Scene
-
-    scene = Scene.from_toml(path) if path is not None else Scene()
-    given = {"mass_kg": mass_kg, "length_m": length_m, "bob_radius_m": bob_radius_m}
-    pendulum = replace(scene.pendulum, **{name: value for name, value in given.items() if value is not None})
-    environment = scene.environment if g is None else replace(scene.environment, g_m_per_s2=g, latitude_deg=None)
-    return replace(scene, pendulum=pendulum, environment=environment)
-
-
-def _measuring(
-    recording: Path,
-    start: float | None,
-    stop: float | None,
-    pivot: str | None,
-    bob: str | None,
-    radius: float | None,
-    fps_factor: float,
-) -> dict[str, Any]:
+def _refuse_clicks(recording: Path, told: dict[str, Any]) -> None:
+    """A θ(t) file has no pixels to click on."""
     from toolkit.analyse import is_video
     from toolkit.errors import UsageError
 
-    tracking = _tracking(pivot, bob, radius, fps_factor)
-    if is_video(recording):
-        return {"start_s": start, "stop_s": stop, **tracking}
-    if pivot or bob or radius is not None or fps_factor != 1.0:
+    if told and not is_video(recording):
         raise UsageError(f"--pivot, --bob, --radius and --fps-factor are for videos; {recording.name} is a θ(t) file")
-    return {"start_s": start, "stop_s": stop}
-
-
-def _tracking(pivot: str | None, bob: str | None, radius: float | None, fps_factor: float) -> dict[str, Any]:
-    from toolkit.errors import UsageError
-
-    if not fps_factor > 0:
-        raise UsageError(f"--fps-factor must be positive, got {fps_factor}")
-    if radius is not None and not radius > 0:
-        raise UsageError(f"--radius must be positive, got {radius}")
-    return {
-        "pivot": _point(pivot, "--pivot"),
-        "bob": _point(bob, "--bob"),
-        "radius": radius,
-        "fps_factor": fps_factor,
-    }
 
 
 def _formats(text: str) -> tuple[str, ...]:
@@ -469,7 +458,7 @@ def _point(text: str | None, option: str) -> tuple[float, float] | None:
     return x, y
 
 
-def _print_analysis(analysis: Analysis) -> None:
+def _print_analysis(analysis: "Analysis") -> None:
     from toolkit.report.terminal import summary_lines
 
     for line in summary_lines(analysis):
@@ -483,7 +472,7 @@ def _print_warnings(sentences: Any) -> None:
 
 
 @contextmanager
-def _progress() -> Iterator[Progress]:
+def _progress() -> "Iterator[Progress]":
     """A progress bar on stderr where that is a terminal; silence elsewhere."""
     from toolkit.progress import silent
 
