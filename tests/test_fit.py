@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -259,6 +260,9 @@ def test_failures_are_results_with_a_remedy():
     result = fit(short, model="full_linear_quadratic_coulomb")
     assert not result.success
     assert "record for longer" in result.message
+    assert result.message.key == "fit.too_few_points"
+    assert result.message.values == {"points": len(short), "parameters": 7}
+    assert pickle.loads(pickle.dumps(result.message)).values == result.message.values
     rng = np.random.default_rng(1)
     noise = ThetaSeries(np.arange(300) / 30.0, rng.normal(size=300))
     assert not fit(noise).success

@@ -13,6 +13,7 @@ import numpy as np
 from toolkit.errors import PendulabError, UsageError
 from toolkit.progress import Progress, silent
 from toolkit.scene import Scene
+from toolkit.sentence import Sentence
 
 if TYPE_CHECKING:
     from toolkit.series import ThetaSeries
@@ -39,6 +40,10 @@ class FitResult:
     in order.    chi2, dof, aic, bic : of the fit with the σ used (`noise` says which).    residuals_rad : (n,)
     measured minus model.    theta_rad, omega_rad_per_s : (n,) the model at the series' times.
     success False comes with a `message` that says what happened and the remedy; nothing is raised.
+    message and warnings are `Sentence`s, whose `key` and `values` another language is written from:
+    fit.converged · fit.too_few_points (points, parameters) · fit.unsolvable · fit.singular (names) · fit.near_critical ·
+    fit.unsettled (reason) · fit.not_followed · fit.at_zero (name) · fit.prior_left (name, sigmas) ·
+    fit.length_contradicted (given_m, fitted_m, fitted_u_m).
     noise : sigma_rad used, where it came from, residual autocorrelation (rho1), inflation of the error bars.
     derived : name -> FittedParameter of what follows from the parameters (T0_s, Q, length_m …).
     lmfit : lmfit's own MinimizerResult.    problem : what was solved (`toolkit.fitting.problem.Problem`), to solve it again.
@@ -220,9 +225,13 @@ def _freed_length(
     fitted, given = trial.parameters["length"], held[name].parameters["length"].value
     if fitted.stderr is None or abs(fitted.value - given) <= 4 * fitted.stderr:
         return None
-    return (
+    return Sentence(
         f"the length given, {given:.4g} m, contradicts the period: the record asks for {fitted.value:.5g} m "
-        f"± {fitted.stderr:.1g} m; the length was fitted. Measure from the pivot to the bob's centre."
+        f"± {fitted.stderr:.1g} m; the length was fitted. Measure from the pivot to the bob's centre.",
+        "fit.length_contradicted",
+        given_m=given,
+        fitted_m=fitted.value,
+        fitted_u_m=fitted.stderr,
     )
 
 

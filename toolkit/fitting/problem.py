@@ -16,6 +16,7 @@ from toolkit.fitting.noise import measure_noise, spread
 from toolkit.models import load_model
 from toolkit.models.model import Model, Motion
 from toolkit.registry import did_you_mean
+from toolkit.sentence import Sentence
 
 if TYPE_CHECKING:
     from toolkit.scene import Scene
@@ -191,9 +192,8 @@ class Problem:
         """
         n, k = len(self.series), len(self.free) - len(self.priors)
         if n <= k:
-            return self._failed(
-                f"{n} points cannot fix {k} parameters; record for longer or at a higher frame rate", None
-            )
+            few = f"{n} points cannot fix {k} parameters; record for longer or at a higher frame rate"
+            return self._failed(Sentence(few, "fit.too_few_points", points=n, parameters=k), None)
         attempts = []
         for begin in self._starts(start):
             found = self._descend_bounded(begin)
@@ -203,7 +203,8 @@ class Problem:
             if self._good(found) or (found.success and not thorough):
                 break
         if not attempts:
-            return self._failed("the equation could not be solved from any start; check the times and angles", None)
+            none = "the equation could not be solved from any start; check the times and angles"
+            return self._failed(Sentence(none, "fit.unsolvable"), None)
         best = min(attempts, key=lambda a: a.cost)
         return self._weighed(best, self._report(best))
 
@@ -571,34 +572,46 @@ class Problem:
                 value, u, UNITS[name], i is None, minimum=0.0 if name in _DRAG_NAMES else None
             )
         for name in found.at_zero:
-            warnings.append(f"{name} came out negative and is held at its bound 0: the record does not show this drag")
+            bound = f"{name} came out negative and is held at its bound 0: the record does not show this drag"
+            warnings.append(Sentence(bound, "fit.at_zero", name=name))
         for name, (mean, prior_u) in self.priors.items():
             if name in self.free and abs(values[name] - mean) > 2.5 * prior_u:
-                warnings.append(
-                    f"{name} left what was measured beforehand by {abs(values[name] - mean) / prior_u:.1f} of its standard "
-                    "uncertainties: the record contradicts it, or the model is not the one for this record"
+                off = abs(values[name] - mean) / prior_u
+                left = (
+                    f"{name} left what was measured beforehand by {off:.1f} of its standard uncertainties: the record "
+                    "contradicts it, or the model is not the one for this record"
                 )
+                warnings.append(Sentence(left, "fit.prior_left", name=name, sigmas=off))
         chi2 = float(normalised @ normalised)
         inflation2 = noise.inflation**2
-        success, message = found.success, "the fit converged"
+        success, message = found.success, Sentence("the fit converged", "fit.converged")
         if singular:
             success = False
-            message = (
-                f"the record cannot fix {', '.join(singular)}: the covariance is singular; "
-                "fit a simpler model or record for longer"
+            names = ", ".join(singular)
+            message = Sentence(
+                f"the record cannot fix {names}: the covariance is singular; fit a simpler model or record for longer",
+                "fit.singular",
+                names=names,
             )
         elif not found.success and self._nearly_critical(reduced):
-            message = (
+            message = Sentence(
                 "the damping is near critical, where the paper's decaying sine has no frequency left to tell amplitude and phase "
-                "by; use a full-sine model, which starts from θ(0) and θ̇(0), or give the length so that ω_g is held"
+                "by; use a full-sine model, which starts from θ(0) and θ̇(0), or give the length so that ω_g is held",
+                "fit.near_critical",
             )
         elif not found.success:
-            message = f"the fit did not settle ({found.lmfit.message.strip()}); give a start value or a shorter stretch"
+            reason = found.lmfit.message.strip()
+            message = Sentence(
+                f"the fit did not settle ({reason}); give a start value or a shorter stretch",
+                "fit.unsettled",
+                reason=reason,
+            )
         elif not self._good(found) and not self.model.small_angle:
             success = False
-            message = (
+            message = Sentence(
                 "the model does not follow the record from any start tried; look for frames that jump, a second motion, "
-                "or cut the record with --start and --stop"
+                "or cut the record with --start and --stop",
+                "fit.not_followed",
             )
         result = FitResult(
             model=self.model.name,
@@ -650,7 +663,7 @@ class Problem:
         loose = [self.free[i] for i in np.flatnonzero(np.abs(vector[:, 0]) > 0.3)] if singular else []
         return covariance, loose
 
-    def _failed(self, message: str, found: Any) -> FitResult:
+    def _failed(self, message: Sentence, found: Any) -> FitResult:
         n = len(self.series)
         nothing = np.full(n, np.nan)
         parameters = {
