@@ -19,6 +19,7 @@ import numpy as np
 from toolkit.errors import JobError, UsageError
 from toolkit.output import whole_file
 from toolkit.scene import Scene
+from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.track import LOST, PREDICTED, Track
 from toolkit.tracking.swing import fit_circle, fit_swing, start_swing
@@ -103,23 +104,42 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
         "localiser": track.localiser,
         **_scale(scene, length, track.radius_px, warnings),
     }
-    log.append(
-        f"Pivot at ({px:.2f}, {py:.2f}) px ± ({pivot.sigma_px[0]:.2f}, {pivot.sigma_px[1]:.2f}) px by {pivot.method}; "
-        f"pivot to bob {length:.2f} px."
-    )
-    log.append(
-        f"The vertical is the middle of the decaying swing: {np.degrees(vertical):.3f}° ± {np.degrees(vertical_sigma):.3f}° "
-        "from the picture's own."
-    )
-    log.append(
-        f"Angles up to {np.degrees(amplitude):.1f}°; random error of one frame {np.degrees(np.median(sigma)):.4f}°, "
-        f"common relative error of all angles {scale_u:.2g} ({pivot.sigma_px[1] / length:.2g} from the pivot, "
-        f"{pivot.view_u:.2g} from the camera's view)."
-    )
+    log += [
+        said(
+            "calibrate.pivot",
+            "Pivot at ({x_px:.2f}, {y_px:.2f}) px ± ({x_u_px:.2f}, {y_u_px:.2f}) px by {method}; pivot to bob {length_px:.2f} px.",
+            x_px=float(px),
+            y_px=float(py),
+            x_u_px=float(pivot.sigma_px[0]),
+            y_u_px=float(pivot.sigma_px[1]),
+            method=pivot.method,
+            length_px=float(length),
+        ),
+        said(
+            "calibrate.vertical",
+            "The vertical is the middle of the decaying swing: {angle_deg:.3f}° ± {u_deg:.3f}° from the picture's own.",
+            angle_deg=float(np.degrees(vertical)),
+            u_deg=float(np.degrees(vertical_sigma)),
+        ),
+        said(
+            "calibrate.errors",
+            "Angles up to {widest_deg:.1f}°; random error of one frame {frame_deg:.4f}°, common relative error of all angles "
+            "{common:.2g} ({by_pivot:.2g} from the pivot, {by_view:.2g} from the camera's view).",
+            widest_deg=float(np.degrees(amplitude)),
+            frame_deg=float(np.degrees(np.median(sigma))),
+            common=float(scale_u),
+            by_pivot=float(pivot.sigma_px[1] / length),
+            by_view=float(pivot.view_u),
+        ),
+    ]
     if pivot.slant is None and pivot.view_u >= _VIEW_U:
         log.append(
-            f"Camera tilt not distinguishable from this clip: angles may be scaled by about {pivot.view_u:.1%} (assumed: a camera "
-            "within some 8° of square, or a phone's lens). A visible string and a larger swing would tell."
+            said(
+                "calibrate.view",
+                "Camera tilt not distinguishable from this clip: angles may be scaled by about {share:.1%} (assumed: a camera "
+                "within some 8° of square, or a phone's lens). A visible string and a larger swing would tell.",
+                share=float(pivot.view_u),
+            )
         )
     meta = {
         "source": track.meta.get("source", "track"),
@@ -177,7 +197,7 @@ def arc_pivot(x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray) -> P
         covariance = np.linalg.inv(jacobian.T @ jacobian) * max(1.0, chi2)
     except np.linalg.LinAlgError:
         return None
-    return PivotEstimate(np.array([cx, cy]), covariance[:2, :2], "the arc of the bob", chi2)
+    return PivotEstimate(np.array([cx, cy]), covariance[:2, :2], said("pivot.arc", "the arc of the bob"), chi2)
 
 
 def line_pivot(x: np.ndarray, y: np.ndarray, angle: np.ndarray, sigma: np.ndarray) -> PivotEstimate | None:
@@ -202,7 +222,7 @@ def line_pivot(x: np.ndarray, y: np.ndarray, angle: np.ndarray, sigma: np.ndarra
         weight = np.where(np.abs(rest) < 4 * spread, 1 / sigma**2, 0.0)
     used = weight > 0
     chi2 = float(np.sum(rest[used] ** 2)) / max(1, int(used.sum()) - 2)
-    return PivotEstimate(xy, covariance * max(1.0, chi2), "the string's lines", chi2)
+    return PivotEstimate(xy, covariance * max(1.0, chi2), said("pivot.lines", "the string's lines"), chi2)
 
 
 def _pivot(
@@ -219,7 +239,9 @@ def _pivot(
         sigma = max(
             _CLICK_SIGMA_PX, *(track.pivot_sigma_px if np.all(np.isfinite(track.pivot_sigma_px)) else (0.0, 0.0))
         )
-        return PivotEstimate(np.array(track.pivot_px, float), np.eye(2) * sigma**2, "the position given")
+        return PivotEstimate(
+            np.array(track.pivot_px, float), np.eye(2) * sigma**2, said("pivot.given", "the position given")
+        )
     arc = arc_pivot(x, y, sx, sy)
     lines = _string_pivot(track, kept)
     if arc is None and lines is None:
@@ -230,9 +252,17 @@ def _pivot(
     both = arc.covariance + lines.covariance
     chi2 = float(difference @ np.linalg.solve(both, difference))
     log.append(
-        f"The arc puts the pivot at ({arc.xy[0]:.2f}, {arc.xy[1]:.2f}) px, the string's lines at "
-        f"({lines.xy[0]:.2f}, {lines.xy[1]:.2f}) px."
+        said(
+            "calibrate.two_pivots",
+            "The arc puts the pivot at ({arc_x_px:.2f}, {arc_y_px:.2f}) px, the string's lines at ({lines_x_px:.2f}, "
+            "{lines_y_px:.2f}) px.",
+            arc_x_px=float(arc.xy[0]),
+            arc_y_px=float(arc.xy[1]),
+            lines_x_px=float(lines.xy[0]),
+            lines_y_px=float(lines.xy[1]),
+        )
     )
+    together = said("pivot.both", "the arc and the string's lines together")
     gain = arc.covariance @ np.linalg.inv(both)
     xy = arc.xy - gain @ difference
     covariance = arc.covariance - gain @ arc.covariance
@@ -241,27 +271,35 @@ def _pivot(
     apart = np.hypot(float(np.hypot(*difference)) if chi2 > 11.8 else 0.0, np.sqrt(both[1, 1])) / away
     view_u = 0.5 * float(np.hypot(apart, _ARC_U))
     if chi2 > 11.8:  # 3σ for two numbers
-        said = (
-            f"the pivot by the arc and by the string differ by {np.hypot(*difference):.1f} px ({np.sqrt(chi2):.0f}σ): "
-            "the camera was tilted, its lens distorts, or the bob swung out of the plane"
+        differ = said(
+            "calibrate.pivots_differ",
+            "the pivot by the arc and by the string differ by {apart_px:.1f} px ({sigmas:.0f}σ): the camera was tilted, its lens "
+            "distorts, or the bob swung out of the plane",
+            apart_px=float(np.hypot(*difference)),
+            sigmas=float(np.sqrt(chi2)),
         )
         slant = _slant(x - lines.xy[0], y - lines.xy[1])
         if slant is None:
-            warnings.append(f"{said}; angles may be wrong by about {view_u:.1%}")
-            method = "the arc and the string's lines together"
-            return PivotEstimate(xy, covariance * chi2 / 2, method, chi2, view_u=view_u)
+            wrong = "{differ}; angles may be wrong by about {share:.1%}"
+            warnings.append(said("calibrate.pivots_kept", wrong, differ=differ, share=view_u))
+            return PivotEstimate(xy, covariance * chi2 / 2, together, chi2, view_u=view_u)
         # seen at a slant a circle is an ellipse; the string's lines still meet in its centre
         small, large = np.linalg.eigvalsh(slant)
         tilt = float(np.degrees(np.arccos(small / large)))
         warnings.append(
-            f"{said}; read as a view at a slant of {tilt:.0f}°, which was taken out; for it angles are uncertain by "
-            f"{(large / small - 1) / 3:.1%}"
+            said(
+                "calibrate.slant",
+                "{differ}; read as a view at a slant of {slant_deg:.0f}°, which was taken out; for it angles are uncertain by "
+                "{share:.1%}",
+                differ=differ,
+                slant_deg=tilt,
+                share=float((large / small - 1) / 3),
+            )
         )
         view_u = max(_ARC_U / 2, (large / small - 1) / 3)
-        return PivotEstimate(
-            lines.xy, lines.covariance, "the string's lines, the arc seen at a slant", chi2, slant, view_u
-        )
-    return PivotEstimate(xy, covariance, "the arc and the string's lines together", view_u=min(view_u, _VIEW_U))
+        slanted = said("pivot.slanted", "the string's lines, the arc seen at a slant")
+        return PivotEstimate(lines.xy, lines.covariance, slanted, chi2, slant, view_u)
+    return PivotEstimate(xy, covariance, together, view_u=min(view_u, _VIEW_U))
 
 
 def _slant(dx: np.ndarray, dy: np.ndarray) -> np.ndarray | None:
@@ -333,7 +371,12 @@ def _scale(scene: Scene | None, length_px: float, radius_px: float, warnings: li
         found["px_per_m_by_radius"] = by_radius
         if abs(by_length / by_radius - 1) > 0.05:
             warnings.append(
-                f"length_m gives {by_length:.0f} px per metre, bob_radius_m {by_radius:.0f}: one of them is wrong, or the "
-                "camera was tilted"
+                said(
+                    "calibrate.scales_differ",
+                    "length_m gives {by_length:.0f} px per metre, bob_radius_m {by_radius:.0f}: one of them is wrong, or the "
+                    "camera was tilted",
+                    by_length=by_length,
+                    by_radius=by_radius,
+                )
             )
     return found

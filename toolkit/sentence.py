@@ -18,3 +18,11 @@ class Sentence(str):
         made = super().__new__(cls, text)
         made.key, made.values = key, values
         return made
+
+
+def said(key: str, template: str, /, **values: Any) -> Sentence:
+    """The Sentence of an English `template` (`"… {length_px:.2f} px …"`), which other languages fill with the same values.
+
+    A value may itself be a Sentence.
+    """
+    return Sentence(template.format(**values), key, **values)

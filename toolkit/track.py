@@ -13,6 +13,7 @@ import numpy as np
 from toolkit.errors import JobError, UsageError
 from toolkit.output import whole_file
 from toolkit.progress import Progress, silent
+from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
 from toolkit.tracking.follow import Follower, Record
@@ -209,8 +210,13 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     slips = _clock_slips(t, x - mx, y - my, swing, good)
     if slips.size:
         warnings.append(
-            f"the clock of the file slips by whole frames at {slips.size} place(s), first at t = {t[slips[0]]:.3f} s (a "
-            "camera that lost or repeated frames and did not say so); the error bars allow for it"
+            said(
+                "track.clock_slips",
+                "the clock of the file slips by whole frames at {places} place(s), first at t = {t_s:.3f} s (a camera that lost "
+                "or repeated frames and did not say so); the error bars allow for it",
+                places=int(slips.size),
+                t_s=float(t[slips[0]]),
+            )
         )
     good = good & ~_out_of_time(r, t, x - mx, y - my, swing, good, warnings)
     for a in (x, y, sx, sy):
@@ -237,11 +243,26 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     fps = float(1 / np.median(steps[steps > 0])) * fps_factor if np.any(steps > 0) else float("nan")
     look = follower.look
     log += [
-        f"The bob was followed by its {follower.sight.name} with the {follower.localiser.name} localiser (radius "
-        f"{look.radius_px:.2f} px, edge {look.edge_px:.2f} px, exposure {follower.exposure_s / fps_factor * 1e3:.1f} ms): "
-        f"{good.sum()} of {good.size} frames measured, {bridged.sum()} bridged by the fitted motion.",
-        f"The error bars of the fit were multiplied by {scale[0]:.2f} (x) and {scale[1]:.2f} (y), "
-        "the scatter seen about a smooth motion.",
+        said(
+            "track.followed",
+            "The bob was followed by its {sight} with the {localiser} localiser (radius {radius_px:.2f} px, edge "
+            "{edge_px:.2f} px, exposure {exposure_ms:.1f} ms): {measured} of {frames} frames measured, {bridged} bridged by "
+            "the fitted motion.",
+            sight=said(f"track.by_{follower.sight.name}", follower.sight.name),
+            localiser=follower.localiser.name,
+            radius_px=float(look.radius_px),
+            edge_px=float(look.edge_px),
+            exposure_ms=1e3 * follower.exposure_s / fps_factor,
+            measured=int(good.sum()),
+            frames=int(good.size),
+            bridged=int(bridged.sum()),
+        ),
+        said(
+            "track.error_bars",
+            "The error bars of the fit were multiplied by {x:.2f} (x) and {y:.2f} (y), the scatter seen about a smooth motion.",
+            x=float(scale[0]),
+            y=float(scale[1]),
+        ),
     ]
     strings = np.full((t.size, 5), np.nan)
     for k, line in r.string.items():
@@ -321,8 +342,14 @@ class _Shift:
         self.sigma = np.full(n, noise)
         extent = np.ptp(shifts, axis=0)
         log.append(
-            f"The camera moved by up to {extent[0]:.1f} px across and {extent[1]:.1f} px down; this was measured on the "
-            f"still background (to {noise:.3f} px a frame) and taken away."
+            said(
+                "track.shake",
+                "The camera moved by up to {across_px:.1f} px across and {down_px:.1f} px down; this was measured on the still "
+                "background (to {noise_px:.3f} px a frame) and taken away.",
+                across_px=float(extent[0]),
+                down_px=float(extent[1]),
+                noise_px=float(noise),
+            )
         )
 
 
@@ -389,16 +416,24 @@ def _out_of_time(
     leap &= (np.abs(along - near) > np.maximum(8 * noise, 0.5 * step)) & (np.abs(across) < 4 * noise + 0.5 * step)
     repeats = np.array(r.repeated) & (step > 4 * noise) & good
     if repeats.any():
-        first = t[np.flatnonzero(repeats)[0]]
         warnings.append(
-            f"{repeats.sum()} frame(s) repeat the picture before them, first at t = {first:.3f} s; they were not measured"
+            said(
+                "track.repeats",
+                "{frames} frame(s) repeat the picture before them, first at t = {t_s:.3f} s; they were not measured",
+                frames=int(repeats.sum()),
+                t_s=float(t[np.flatnonzero(repeats)[0]]),
+            )
         )
     leap &= ~repeats
     if leap.any():
-        first = t[np.flatnonzero(leap)[0]]
         warnings.append(
-            f"{leap.sum()} frame(s) show the bob at another time than their stamp says (a camera that drops or repeats "
-            f"frames), first at t = {first:.3f} s; they were left out"
+            said(
+                "track.leaps",
+                "{frames} frame(s) show the bob at another time than their stamp says (a camera that drops or repeats frames), "
+                "first at t = {t_s:.3f} s; they were left out",
+                frames=int(leap.sum()),
+                t_s=float(t[np.flatnonzero(leap)[0]]),
+            )
         )
     return leap | repeats
 
@@ -493,21 +528,30 @@ def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:
 
 def _poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, sigma_px: float) -> list[str]:
     """Sentences on a motion that was accepted, but is not quite that of a pendulum; `sigma_px` is a place's error bar."""
-    said = []
+    poor: list[str] = []
     growth, sigma = _growth(swing, t[good])
     if growth > 0.02 + 4 * sigma:
-        said.append(
-            f"the swing grows by {np.expm1(growth):.1%}: it is driven, or swings towards the camera by turns; a free decay "
-            "does not describe it"
+        poor.append(
+            said(
+                "track.grows",
+                "the swing grows by {share:.1%}: it is driven, or swings towards the camera by turns; a free decay does not "
+                "describe it",
+                share=float(np.expm1(growth)),
+            )
         )
     if swing.rms_px > max(0.15, 3 * sigma_px) or swing.rms_px > 0.5:
-        said.append(
-            f"the bob's places stray {swing.rms_px:.2f} px (rms) from a plane pendulum's swing on a circle: the camera was tilted "
-            "or shook, its lens distorts, the bob swung out of the plane, was driven, or was not followed well"
+        poor.append(
+            said(
+                "track.strays",
+                "the bob's places stray {rms_px:.2f} px (rms) from a plane pendulum's swing on a circle: the camera was tilted "
+                "or shook, its lens distorts, the bob swung out of the plane, was driven, or was not followed well",
+                rms_px=float(swing.rms_px),
+            )
         )
     if good.mean() < 0.7:
-        said.append(f"the bob was measured on only {good.mean():.0%} of the frames")
-    return said
+        share = float(good.mean())
+        poor.append(said("track.few", "the bob was measured on only {share:.0%} of the frames", share=share))
+    return poor
 
 
 def _true_sigma(r: np.ndarray, s: np.ndarray, good: np.ndarray, others: np.ndarray) -> float:
@@ -548,7 +592,12 @@ def _even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:
     if np.ptp(off) > 1.05 * tick:
         return t
     log.append(
-        f"The file keeps times to {tick * 1e3:.3g} ms only; all agree with {rate:.6g} frames per second, which was used."
+        said(
+            "track.even_times",
+            "The file keeps times to {tick_ms:.3g} ms only; all agree with {rate_hz:.6g} frames per second, which was used.",
+            tick_ms=1e3 * tick,
+            rate_hz=float(rate),
+        )
     )
     return grid + 0.5 * (off.max() + off.min())
 

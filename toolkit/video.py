@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from toolkit.errors import JobError, UsageError
+from toolkit.sentence import said
 
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 # 8-bit formats whose plane 0 is the luma itself
@@ -135,7 +136,11 @@ def _open_pyav(path: Path) -> Video:
             seconds = container.duration / 1e6
         if seconds:
             metadata["duration_s"] = f"{seconds:.6g}"
-    warnings = [] if stamped else ["the file has no time stamps; frame number / frame rate is used instead"]
+    warnings = (
+        []
+        if stamped
+        else [said("video.no_stamps", "the file has no time stamps; frame number / frame rate is used instead")]
+    )
     return Video(
         path=path,
         width_px=size[0],
@@ -288,7 +293,7 @@ def _open_pictures(folder: Path, fps: float | None) -> Video:
     if picture is None:
         raise JobError(f"{names[0]} cannot be read as a picture; save the frames as PNG")
     rate = fps or 30.0
-    said = () if fps else ("pictures carry no time stamps: 30 frames per second is assumed",)
+    assumed = said("video.pictures", "pictures carry no time stamps: 30 frames per second is assumed")
     return Video(
         path=folder,
         width_px=picture.shape[1],
@@ -297,7 +302,7 @@ def _open_pictures(folder: Path, fps: float | None) -> Video:
         codec="pictures",
         time_source="pictures",
         full_range=True,
-        warnings=said,
+        warnings=() if fps else (assumed,),
         _frames=lambda: _read_pictures(names, rate, picture.shape),
     )
 
@@ -333,28 +338,44 @@ def _from_bgr(index: int, t_s: float, picture: np.ndarray) -> Frame:
 
 def clock_warnings(t_s: np.ndarray, video: Video) -> list[str]:
     """What is odd about the time stamps `t_s` (n,) of all decoded frames: sentences, none for a sound clock."""
-    said: list[str] = []
+    odd: list[str] = []
     if t_s.size < 3:
-        return said
+        return odd
     steps = np.diff(t_s)
     if np.all(steps == 0):
-        return ["all time stamps are equal: the clock of this file is broken; convert it with its frame rate set"]
+        equal = "all time stamps are equal: the clock of this file is broken; convert it with its frame rate set"
+        return [said("video.equal_stamps", equal)]
     backwards = int(np.sum(steps <= 0))
     if backwards:
-        said.append(f"{backwards} time stamps do not increase: the clock of this file is suspicious")
+        odd.append(
+            said(
+                "video.backwards",
+                "{count} time stamps do not increase: the clock of this file is suspicious",
+                count=backwards,
+            )
+        )
     forward = steps[steps > 0]
     typical = float(np.median(forward))
     jumps = np.flatnonzero(steps > 1.5 * typical)
     if jumps.size > 0.2 * steps.size:
-        said.append(
-            f"the frame rate varies (steps of {forward.min() * 1e3:.1f} to {forward.max() * 1e3:.1f} ms); "
-            "the true time stamps are used"
+        odd.append(
+            said(
+                "video.varying_rate",
+                "the frame rate varies (steps of {shortest_ms:.1f} to {longest_ms:.1f} ms); the true time stamps are used",
+                shortest_ms=1e3 * float(forward.min()),
+                longest_ms=1e3 * float(forward.max()),
+            )
         )
     elif jumps.size:
         missing = int(np.round(steps[jumps] / typical - 1).sum())
-        said.append(
-            f"{missing} frame(s) are missing at {jumps.size} place(s), first at t = {t_s[jumps[0]]:.3f} s; "
-            "the time stamps account for them"
+        odd.append(
+            said(
+                "video.missing_frames",
+                "{missing} frame(s) are missing at {places} place(s), first at t = {t_s:.3f} s; the time stamps account for them",
+                missing=missing,
+                places=int(jumps.size),
+                t_s=float(t_s[jumps[0]]),
+            )
         )
     fps = 1 / typical
     mean = (t_s.size - 1) / (t_s[-1] - t_s[0])
@@ -366,17 +387,29 @@ def clock_warnings(t_s: np.ndarray, video: Video) -> list[str]:
         and not jumps.size
         and abs(claimed / mean - 1) > max(1e-3, 1.1 / t_s.size)
     ):
-        said.append(
-            f"the header claims {claimed:.4f} frames per second, the time stamps give {mean:.4f}: times follow the stamps; if the "
-            f"header were right, all times would differ by {mean / claimed - 1:+.2%}"
+        odd.append(
+            said(
+                "video.header_rate",
+                "the header claims {claimed_hz:.4f} frames per second, the time stamps give {mean_hz:.4f}: times follow the "
+                "stamps; if the header were right, all times would differ by {share:+.2%}",
+                claimed_hz=float(claimed),
+                mean_hz=float(mean),
+                share=float(mean / claimed - 1),
+            )
         )
     capture = _capture_fps(video.metadata)
     if capture and capture > 1.2 * fps:
-        said.append(
-            f"slow motion: recorded at {capture:g} frames per second and stored at {fps:.4g}; "
-            f"give --fps-factor {capture / fps:.4g} to restore true time"
+        odd.append(
+            said(
+                "video.slow_motion",
+                "slow motion: recorded at {capture_hz:g} frames per second and stored at {fps:.4g}; "
+                "give --fps-factor {factor:.4g} to restore true time",
+                capture_hz=capture,
+                fps=fps,
+                factor=capture / fps,
+            )
         )
-    return said
+    return odd
 
 
 def _capture_fps(metadata: Mapping[str, str]) -> float | None:
