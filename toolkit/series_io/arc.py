@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.errors import JobError
+from toolkit.sentence import said
 
 
 @dataclass(frozen=True)
@@ -98,26 +99,53 @@ def swing_from_positions(
                 scatter / np.sqrt(good.sum()), apart if circle and circle.sigma_radius < 0.1 * circle.radius else 0.0
             )
             log.append(
-                f"θ was taken about the origin of the coordinates; the bob's distance from it is {length:.4g} {unit} (rms scatter {scatter:.2g})."
+                said(
+                    "arc.origin",
+                    "θ was taken about the origin of the coordinates; the bob's distance from it is {length:.4g} {unit} (rms "
+                    "scatter {scatter:.2g}).",
+                    length=length,
+                    unit=unit,
+                    scatter=scatter,
+                )
             )
             if circle and length_sigma > 0.02 * length:
                 warnings.append(
-                    f"The arc's own centre gives a length of {circle.radius:.4g} {unit} instead of {length:.4g}: check the origin, tilt and distortion."
+                    said(
+                        "arc.disagrees",
+                        "The arc's own centre gives a length of {radius:.4g} {unit} instead of {length:.4g}: check the origin, "
+                        "tilt and distortion.",
+                        radius=circle.radius,
+                        unit=unit,
+                        length=length,
+                    )
                 )
         else:
             warnings.append(
-                f"The origin of the coordinates is not the pivot (the distance from it varies by {scatter:.2g} {unit}); the centre of the arc was taken."
+                said(
+                    "arc.not_the_pivot",
+                    "The origin of the coordinates is not the pivot (the distance from it varies by {scatter:.2g} {unit}); the "
+                    "centre of the arc was taken.",
+                    scatter=scatter,
+                    unit=unit,
+                )
             )
     if about is None:
         assert circle is not None
         about, length, length_sigma, scatter = (circle.x, circle.y), circle.radius, circle.sigma_radius, circle.scatter
         log.append(
-            f"The pivot is the centre of a circle fitted to the positions: radius {length:.5g} ± {length_sigma:.2g} {unit}, rms scatter {scatter:.2g} {unit}."
+            said(
+                "arc.centre",
+                "The pivot is the centre of a circle fitted to the positions: radius {radius:.5g} ± {radius_u:.2g} {unit}, rms "
+                "scatter {scatter:.2g} {unit}.",
+                radius=length,
+                radius_u=length_sigma,
+                unit=unit,
+                scatter=scatter,
+            )
         )
         if length_sigma > 0.1 * length:
-            warnings.append(
-                f"The arc is too short to place the pivot well (radius ± {100 * length_sigma / length:.0f} %): all angles share that uncertainty."
-            )
+            short = "The arc is too short to place the pivot well (radius ± {share:.0%}): all angles share that uncertainty."
+            warnings.append(said("arc.short", short, share=length_sigma / length))
     if np.median(y_up[good]) > about[1]:
         raise JobError(
             "the bob hangs above its pivot in these positions; the vertical axis seems to point down: check the axes"

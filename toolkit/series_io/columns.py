@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from toolkit.errors import JobError
+from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.series_io.table_text import Table
 
@@ -144,7 +145,7 @@ def series_from_table(table: Table, path: Path, what: str = "") -> ThetaSeries:
     time_scale = chosen["t"][1]
     if time_scale is None:
         time_scale = 1.0
-        warnings.append("The time column names no unit; seconds were assumed.")
+        warnings.append(said("series.seconds_assumed", "The time column names no unit; seconds were assumed."))
     sigma_t = values.get("sigma_t")
     sigma = values.get("sigma_theta")
     return clean_series(
@@ -166,7 +167,9 @@ def _choose(table: Table, path: Path, log: list[str], warnings: list[str]) -> di
             hint = "; with decimal commas use tabs or semicolons between columns" if width in (4, 6) else ""
             raise JobError(f"{path} has {width} columns without names; name them, as in t_s,theta_rad{hint}")
         warnings.append(
-            "The columns have no names; time, angle" + (", σ of the angle" if width == 3 else "") + " were assumed."
+            said("series.three_assumed", "The columns have no names; time, angle, σ of the angle were assumed.")
+            if width == 3
+            else said("series.two_assumed", "The columns have no names; time, angle were assumed.")
         )
         return {key: (k, None) for k, key in enumerate(("t", "theta", "sigma_theta")[:width])}
     columns = [understand(name) for name in table.names]
@@ -181,13 +184,14 @@ def _choose(table: Table, path: Path, log: list[str], warnings: list[str]) -> di
             if column.quantity in ("x", "y") and key not in found:
                 found[key] = (k, None)
         if {"t", "theta"} <= set(found):
-            warnings.append("Columns X and Y were taken as time and angle.")
+            warnings.append(said("series.x_and_y", "Columns X and Y were taken as time and angle."))
     for key, example in (("t", "t_s"), ("theta", "theta_rad or theta_deg")):
         if key not in found:
             names = ", ".join(repr(name[:30]) for name in table.names[:8])
             kind = "times" if key == "t" else "angles"
             raise JobError(f"{path} has no column of {kind} (columns: {names}); name one {example}")
-    log.append("Columns used: " + ", ".join(repr(table.names[k][:40]) for k, _ in found.values()) + ".")
+    names = ", ".join(repr(table.names[k][:40]) for k, _ in found.values())
+    log.append(said("series.columns", "Columns used: {names}.", names=names))
     return found
 
 
@@ -196,10 +200,12 @@ def angle_scale_by_size(theta: np.ndarray, path: Path, warnings: list[str]) -> f
     theta = theta[np.isfinite(theta)]
     largest = float(np.max(np.abs(theta))) if theta.size else 0.0
     if largest <= 1.7:
-        warnings.append(f"No unit is named; the angles reach {largest:.3g}, so radians were assumed.")
+        in_radians = "No unit is named; the angles reach {largest:.3g}, so radians were assumed."
+        warnings.append(said("series.radians_assumed", in_radians, largest=largest))
         return 1.0
     if largest > 3.2:
-        warnings.append(f"No unit is named; the angles reach {largest:.3g}, so degrees were assumed.")
+        in_degrees = "No unit is named; the angles reach {largest:.3g}, so degrees were assumed."
+        warnings.append(said("series.degrees_assumed", in_degrees, largest=largest))
         return float(np.pi / 180)
     raise JobError(
         f"{path}: angles up to {largest:.3g} without a unit could be degrees or radians; name it theta_deg or theta_rad"
@@ -226,7 +232,8 @@ def clean_series(
     if not keep.any():
         raise JobError(f"{path} has no row with both a time and an angle; export θ(t) again")
     if not keep.all():
-        warnings.append(f"{np.sum(~keep)} of {keep.size} rows have no time or no angle and were left out.")
+        left_out = "{count} of {rows} rows have no time or no angle and were left out."
+        warnings.append(said("series.left_out", left_out, count=int(np.sum(~keep)), rows=keep.size))
     columns = [c[keep] if c is not None else None for c in (t_s, theta_rad, sigma_rad, sigma_t_s)]
     columns = _in_order(columns, path, warnings)
     columns = _without_repeats(columns, path, warnings)
@@ -234,17 +241,19 @@ def clean_series(
     assert t is not None
     assert theta is not None
     if shift and t.size > 1 and (t[0] < 0 or t[0] > 0.1 * (t[-1] - t[0])):
-        log.append(f"The file's times begin at {t[0]:.6g} s; t = 0 is its first row here.")
+        begin = "The file's times begin at {start_s:.6g} s; t = 0 is its first row here."
+        log.append(said("series.start", begin, start_s=float(t[0])))
         t = t - t[0]
-    sigma = _positive(sigma, "angle", warnings)
+    sigma = _positive(sigma, said("series.of_angle", "angle"), warnings)
     if sigma_t is not None and t.size > 2:
-        sigma_t = _positive(sigma_t, "time", warnings)
+        sigma_t = _positive(sigma_t, said("series.of_time", "time"), warnings)
     if sigma_t is not None and t.size > 2:
         through_time = sigma_t * np.abs(np.gradient(theta, t))
         sigma = through_time + 1e-12 if sigma is None else np.hypot(sigma, through_time)
-        log.append(f"σ of time ({np.median(sigma_t) * 1e3:.3g} ms) was added into σ of the angle as σ_t·|dθ/dt|.")
-    said = {"source": str(path.name), "log": log, "warnings": warnings, **(meta or {})}
-    return ThetaSeries(t, theta, sigma, said)
+        added = "σ of time ({sigma_ms:.3g} ms) was added into σ of the angle as σ_t·|dθ/dt|."
+        log.append(said("series.sigma_t", added, sigma_ms=1e3 * float(np.median(sigma_t))))
+    all_of_it = {"source": str(path.name), "log": log, "warnings": warnings, **(meta or {})}
+    return ThetaSeries(t, theta, sigma, all_of_it)
 
 
 _Columns = list[np.ndarray | None]
@@ -265,7 +274,8 @@ def _in_order(columns: _Columns, path: Path, warnings: list[str]) -> _Columns:
             f"{path}: time goes back from {t[k]:.6g} to {t[k + 1]:.6g} after row {k + 1} ({back.size} times in all); "
             "keep one run, sort its rows, or name the time column t_s"
         )
-    warnings.append(f"{back.size} rows were out of order in time and have been sorted.")
+    sorted_rows = "{count} rows were out of order in time and have been sorted."
+    warnings.append(said("series.sorted", sorted_rows, count=back.size))
     order = np.argsort(t, kind="stable")
     return [c[order] if c is not None else None for c in columns]
 
@@ -281,7 +291,8 @@ def _without_repeats(columns: _Columns, path: Path, warnings: list[str]) -> _Col
         raise JobError(
             f"{path}: {extra} of {t.size} rows repeat the time of another row; export times with more digits"
         )
-    warnings.append(f"{extra} rows repeat the time of another row; their mean was taken.")
+    repeated = "{count} rows repeat the time of another row; their mean was taken."
+    warnings.append(said("series.repeated_times", repeated, count=extra))
     return [times, *(np.bincount(where, c) / counts if c is not None else None for c in columns[1:])]
 
 
@@ -290,9 +301,11 @@ def _positive(sigma: np.ndarray | None, of: str, warnings: list[str]) -> np.ndar
         return None
     good = np.isfinite(sigma) & (sigma > 0)
     if not good.any():
-        warnings.append(f"The column of σ of the {of} holds no positive number and was left out.")
+        none = "The column of σ of the {of} holds no positive number and was left out."
+        warnings.append(said("series.no_positive_sigma", none, of=of))
         return None
     if not good.all():
-        warnings.append(f"{np.sum(~good)} rows have no positive σ of the {of}; the median of the others was taken.")
+        some = "{count} rows have no positive σ of the {of}; the median of the others was taken."
+        warnings.append(said("series.some_sigma", some, count=int(np.sum(~good)), of=of))
         sigma = np.where(good, sigma, np.median(sigma[good]))
     return sigma

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from toolkit.errors import JobError
+from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.series_io.columns import clean_series
 from toolkit.series_io.series_format import Look, SeriesFormat
@@ -29,16 +30,28 @@ def read(path: Path) -> ThetaSeries:
     except (ValueError, IndexError, KeyError) as error:
         raise JobError(f"{path} is not an encoder record: a sample rate and one angle a line are expected") from error
     start = _first_pass(degrees)
-    log = [
-        f"Read {degrees.size} angles in degrees at {rate:g} Hz from {path.name}.",
-        f"The first {start / rate:.3f} s, up to the first pass through the bottom, were left out: the release by hand is in them.",
+    log: list[str] = [
+        said(
+            "series.encoder",
+            "Read {count} angles in degrees at {rate_hz:g} Hz from {file}.",
+            count=degrees.size,
+            rate_hz=rate,
+            file=path.name,
+        ),
+        said(
+            "series.encoder_start",
+            "The first {left_out_s:.3f} s, up to the first pass through the bottom, were left out: the release by hand is in them.",
+            left_out_s=start / rate,
+        ),
     ]
-    warnings = ["The zero is the encoder's own; the fit finds how far it is from the vertical."]
+    own_zero = "The zero is the encoder's own; the fit finds how far it is from the vertical."
+    warnings: list[str] = [said("series.encoder_zero", own_zero)]
     t_s = np.arange(degrees.size) / rate
     theta = np.radians(degrees)
     step = np.radians(np.min(np.abs(np.diff(degrees))[np.diff(degrees) != 0], initial=1.0))
     sigma = np.full(theta.size, step / np.sqrt(12))
-    log.append(f"σ of the angle is that of the encoder's step, {np.degrees(step):.3g}°/√12.")
+    by_step = "σ of the angle is that of the encoder's step, {step_deg:.3g}°/√12."
+    log.append(said("series.encoder_sigma", by_step, step_deg=float(np.degrees(step))))
     return clean_series(
         t_s[start:] - t_s[start],
         theta[start:],

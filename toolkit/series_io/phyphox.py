@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from toolkit.errors import JobError
+from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.series_io.columns import clean_series
 from toolkit.series_io.series_format import Look, SeriesFormat, decode, peek
@@ -52,7 +53,7 @@ def read(path: Path) -> ThetaSeries:
         )
     t = table.columns[:, times[0]]
     k = max(angles or rates, key=lambda j: float(np.nanstd(table.columns[:, j])))
-    table.log.append(f"phyphox column used: {names[k]!r}.")
+    table.log.append(said("series.phyphox", "phyphox column used: {name!r}.", name=names[k]))
     sigma = None
     if angles:
         scale = 1.0 if "(rad)" in names[k].lower() else np.pi / 180
@@ -62,9 +63,8 @@ def read(path: Path) -> ThetaSeries:
         t, theta = _integrated(t, table.columns[:, k], path, table.log)
         others = [float(np.nanstd(table.columns[:, j])) for j in rates if j != k]
         if others and max(others) > 0.3 * float(np.nanstd(table.columns[:, k])):
-            table.warnings.append(
-                "The phone turned about more than one of its axes; hang it so that one axis lies across the swing."
-            )
+            turned = "The phone turned about more than one of its axes; hang it so that one axis lies across the swing."
+            table.warnings.append(said("series.several_axes", turned))
     return clean_series(t, theta, sigma, path=path, log=table.log, warnings=table.warnings, meta={"format": "phyphox"})
 
 
@@ -93,7 +93,11 @@ def _integrated(t: np.ndarray, rate: np.ndarray, path: Path, log: list[str]) -> 
     middle = 0.25 * (tops[:-2] + 2 * tops[1:-1] + tops[2:])
     line = np.polyfit(middle_t, middle, 1 if middle.size > 3 else 0)
     log.append(
-        "θ is the gyroscope's rate integrated over time; its offset and the start angle were taken out (the swing is symmetric)."
+        said(
+            "series.integrated",
+            "θ is the gyroscope's rate integrated over time; its offset and the start angle were taken out (the swing is "
+            "symmetric).",
+        )
     )
     return t, theta - np.polyval(line, t)
 

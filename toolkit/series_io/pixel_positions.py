@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from toolkit.errors import JobError
+from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.series_io.arc import swing_from_positions
 from toolkit.series_io.columns import clean_series, understand
@@ -45,8 +46,10 @@ def series_from_positions(table: Table, path: Path) -> ThetaSeries:
         swing = swing_from_positions(x, -y if y_down else y)
     except JobError as error:
         raise JobError(f"{path}: {error}") from error
+    names = ", ".join(repr(table.names[at[q]]) for q in ("t", "x", "y"))
+    direction = said("series.y_down", "down") if y_down else said("series.y_up", "up")
     table.log.append(
-        f"Columns used: {', '.join(repr(table.names[at[q]]) for q in ('t', 'x', 'y'))}; y points {'down' if y_down else 'up'}."
+        said("series.positions", "Columns used: {names}; y points {direction}.", names=names, direction=direction)
     )
     table.log.extend(swing.log)
     table.warnings.extend(swing.warnings)
@@ -56,7 +59,8 @@ def series_from_positions(table: Table, path: Path) -> ThetaSeries:
         "angle_scale_relative_u": swing.length_sigma / swing.length,
     }
     sigma = np.full(t_s.shape, max(swing.scatter, 1 / np.sqrt(12) if _whole(x) else 0.0) / swing.length)
-    table.log.append("σ of the angle is the scatter of the positions about the arc, divided by its radius.")
+    by_scatter = "σ of the angle is the scatter of the positions about the arc, divided by its radius."
+    table.log.append(said("series.sigma_by_arc", by_scatter))
     return clean_series(
         t_s * scale, swing.theta_rad, sigma, path=path, log=table.log, warnings=table.warnings, meta=meta
     )

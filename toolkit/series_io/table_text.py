@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from toolkit.errors import JobError
+from toolkit.sentence import said
 from toolkit.series_io.series_format import decode, peek
 
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?\Z")
@@ -58,13 +59,16 @@ def parse_table(text: str, path: Path) -> Table:
     width = _width([cells for _, cells in rows[first : first + 60]])
     names = _header([cells for _, cells in rows[max(0, first - 2) : first]], comments, width, delimiter, path)
     data = rows[first:]
-    log = [f"Read {len(data)} rows from {path.name} ({_DELIMITERS[delimiter]} between columns)."]
+    between = said(f"series.{_DELIMITERS[delimiter]}", _DELIMITERS[delimiter])
+    rows_read = "Read {count} rows from {file} ({delimiter} between columns)."
+    log: list[str] = [said("series.rows", rows_read, count=len(data), file=path.name, delimiter=between)]
     columns, odd, commas = _numbers(data, width, comma, path)
-    warnings = []
+    warnings: list[str] = []
     if commas:
-        log.append("Numbers have a decimal comma.")
+        log.append(said("series.decimal_comma", "Numbers have a decimal comma."))
     if odd:
-        warnings.append(f"{odd} cells hold words instead of numbers and count as missing.")
+        words = "{count} cells hold words instead of numbers and count as missing."
+        warnings.append(said("series.words_for_numbers", words, count=odd))
     if not np.isfinite(columns).any():
         raise JobError(f"{path} holds no numbers under its column names; export θ(t) again")
     return Table(names, columns, tuple(line for _, line in lines[: max(0, first - 1)]), log, warnings)

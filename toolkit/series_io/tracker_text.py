@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from toolkit.errors import JobError
+from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.series_io.arc import swing_from_positions
 from toolkit.series_io.columns import angle_scale_by_size, clean_series
@@ -89,13 +90,14 @@ def read(path: Path) -> ThetaSeries:
     names = _cells(lines[row], delimiter)
     owners = _owners(_cells(lines[row - 1], delimiter), len(names))
     columns = _columns(lines[row + 1 :], delimiter, len(names), path)
-    log = [f"Read {columns.shape[0]} rows of a Tracker text export, {path.name}."]
+    rows_read = "Read {count} rows of a Tracker text export, {file}."
+    log: list[str] = [said("series.tracker_text", rows_read, count=columns.shape[0], file=path.name)]
     warnings: list[str] = []
     time = columns[:, names.index("t")]
     track = _moving_track(names, owners, columns, warnings, path)
     mine = {name: columns[:, k] for k, name in enumerate(names) if owners[k] == track or name == "t"}
     if track:
-        log.append(f"Track {track!r} was used.")
+        log.append(said("series.track_used", "Track {name!r} was used.", name=track))
     meta: dict[str, object] = {"format": "Tracker text export"}
     theta = _theta(mine, path, log, warnings, meta)
     return clean_series(time, theta, None, path=path, log=log, warnings=warnings, meta=meta)
@@ -148,7 +150,8 @@ def _moving_track(names: list[str], owners: list[str], columns: np.ndarray, warn
         )
     best = max(moves, key=lambda owner: moves[owner])
     if len(moves) > 1:
-        warnings.append(f"The file holds {len(moves)} tracks; the one that moves most, {best!r}, was used.")
+        several = "The file holds {count} tracks; the one that moves most, {name!r}, was used."
+        warnings.append(said("series.tracks", several, count=len(moves), name=best))
     return best
 
 
@@ -159,18 +162,24 @@ def _theta(
     for name in ("θ", "theta"):
         if name in mine and np.isfinite(mine[name]).any():
             scale = _scale_by_positions(mine, name) or angle_scale_by_size(mine[name], path, warnings)
-            log.append(f"The angle is Tracker's column {name!r}, in {'radians' if scale == 1 else 'degrees'}.")
+            unit = said("series.radians", "radians") if scale == 1 else said("series.degrees", "degrees")
+            log.append(
+                said("series.tracker_angle", "The angle is Tracker's column {name!r}, in {unit}.", name=name, unit=unit)
+            )
             return mine[name] * scale
     if "x" in mine and "y" in mine:
         try:
-            swing = swing_from_positions(mine["x"], mine["y"], origin=(0.0, 0.0), unit="units of length")
+            swing = swing_from_positions(
+                mine["x"], mine["y"], origin=(0.0, 0.0), unit=said("series.lengths", "units of length")
+            )
         except JobError as error:
             raise JobError(f"{path}: {error}") from error
         log.extend(swing.log)
         warnings.extend(swing.warnings)
         meta["length_m"] = swing.length
         meta["length_sigma_m"] = swing.length_sigma
-        warnings.append("Tracker's text export names no unit of length; metres were assumed for the pendulum's length.")
+        metres = "Tracker's text export names no unit of length; metres were assumed for the pendulum's length."
+        warnings.append(said("series.metres_assumed", metres))
         return swing.theta_rad
     for name in ("θr", "θ_{r}", "thetar"):
         if name in mine and np.isfinite(mine[name]).any():
@@ -202,7 +211,8 @@ def _from_polar(polar_rad: np.ndarray, log: list[str]) -> np.ndarray:
     theta[good] = np.unwrap(polar_rad[good])
     quarter = round(float(np.median(theta[good])) / (np.pi / 2))
     if quarter:
-        log.append(f"Tracker's position angle swings about {90 * quarter}°; that direction was taken as the vertical.")
+        about = "Tracker's position angle swings about {angle_deg}°; that direction was taken as the vertical."
+        log.append(said("series.polar", about, angle_deg=90 * quarter))
     return theta - quarter * np.pi / 2
 
 

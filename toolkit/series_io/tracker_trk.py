@@ -14,6 +14,7 @@ from xml.parsers import expat
 import numpy as np
 
 from toolkit.errors import JobError
+from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.series_io.arc import swing_from_positions
 from toolkit.series_io.columns import clean_series
@@ -43,9 +44,9 @@ def read(path: Path) -> ThetaSeries:
     )
     if panel is None:
         raise JobError(f"{path} is not a Tracker project (no TrackerPanel in it); save the tab in Tracker as .trk")
-    log = [
-        f"Read the Tracker project {path.name} (Tracker {_text(panel, 'semantic_version') or 'of unknown version'})."
-    ]
+    version = _text(panel, "semantic_version") or said("series.unknown_version", "of unknown version")
+    read = "Read the Tracker project {file} (Tracker {version})."
+    log: list[str] = [said("series.tracker_project", read, file=path.name, version=version)]
     warnings: list[str] = []
     frames, px, py, mass, name = _point_mass(panel, path, log, warnings)
     times = _times(panel, frames, path)
@@ -59,16 +60,22 @@ def read(path: Path) -> ThetaSeries:
         meta["length_m"] = swing.length * _TO_METRES[unit]
         meta["length_sigma_m"] = swing.length_sigma * _TO_METRES[unit]
     else:
-        warnings.append("The project has no scale, so it says nothing of the pendulum's length.")
+        warnings.append(
+            said("series.no_scale", "The project has no scale, so it says nothing of the pendulum's length.")
+        )
     mass_unit = _text(panel, "mass_unit") or "kg"
     if mass == 1.0:
         warnings.append(
-            "The track's mass is Tracker's default of 1; it was not used. Give the bob's mass with --mass-kg."
+            said(
+                "series.default_mass",
+                "The track's mass is Tracker's default of 1; it was not used. Give the bob's mass with --mass-kg.",
+            )
         )
     elif mass and mass > 0 and mass_unit in _TO_KG:
         meta["mass_kg"] = mass * _TO_KG[mass_unit]
     meta["angle_scale_relative_u"] = swing.length_sigma / swing.length
-    log.append("The project gives no uncertainty of the positions; the fit estimates it from the residuals.")
+    no_sigma = "The project gives no uncertainty of the positions; the fit estimates it from the residuals."
+    log.append(said("series.no_sigma", no_sigma))
     return clean_series(times, swing.theta_rad, None, path=path, log=log, warnings=warnings, meta=meta)
 
 
@@ -199,11 +206,12 @@ def _point_mass(
     track, points = max(found, key=lambda pair: (len(pair[1]), _spread(pair[1], path)))
     name = _text(track, "name") or "point mass"
     if len(found) > 1:
-        warnings.append(f"The project holds {len(found)} point masses; {name!r}, with the most points, was used.")
+        several = "The project holds {count} point masses; {name!r}, with the most points, was used."
+        warnings.append(said("series.point_masses", several, count=len(found), name=name))
     frames = np.array([index for index, _ in points], dtype=float)
     x = np.array([_number(o, "x", path) for _, o in points])
     y = np.array([_number(o, "y", path) for _, o in points])
-    log.append(f"Track {name!r}: {len(points)} positions.")
+    log.append(said("series.track", "Track {name!r}: {count} positions.", name=name, count=len(points)))
     return frames, x, y, _number(track, "mass", path, default=1.0), name
 
 
