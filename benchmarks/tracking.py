@@ -2,14 +2,16 @@
 
     python benchmarks/tracking.py accuracy            the conditions of the accuracy list, 720p, beside the Cramér–Rao bound
     python benchmarks/tracking.py speed [VIDEO]       CPU time: search, localiser, whole tracking beside decoding alone; memory
-    python benchmarks/tracking.py scenes [--count 216] [--first 0] [--keep FOLDER]
+    python benchmarks/tracking.py scenes [--count 216] [--first 0] [--jobs 2] [--keep FOLDER]
                                                       random scenes over all camera effects: locked, silent failures, σ
 
 Every scene is random by its number alone, so a failure is named by a number. A clip is
 - locked: a track came out, 95 % of the frames on which the bob is wholly visible (repeated pictures aside) are ok, rms error per axis below 1 px;
 - wrong: the rms error of ok frames is over 1 px, or θ is off by more than 5 σ of what calibration.json states: the
-  zero (against vertical_sigma_rad), the scale (against angle_scale_relative_u) or the rest (against the σ of each frame);
-- a silent failure: wrong, and neither refused nor accompanied by a warning.
+  zero (against vertical_sigma_rad), the scale (against angle_scale_relative_u) or the rest (against the σ of each frame),
+  all at the times that theta.csv states (where the shutter rolls, but for a constant: which row a stamp belongs to is unknown);
+- a silent failure: wrong, and neither refused nor accompanied by any warning;
+- misled: wrong in something that none of its warnings is about (`ABOUT` lists which is about what).
 """
 
 from __future__ import annotations
@@ -19,8 +21,10 @@ import csv
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +36,14 @@ from toolkit import JobError, Scene, calibrate, render, track
 from toolkit.camera import effect_names
 from toolkit.cost.tracking import cramer_rao_px
 from toolkit.render import stage
+
+# Which warnings (by the key of their sentence) are about which error.
+ABOUT: dict[str, frozenset[str]] = {
+    "position": frozenset({"track.strays", "track.few"}),
+    "zero": frozenset({"track.strays", "calibrate.wide", "track.grows"}),
+    "scale": frozenset({"track.strays", "calibrate.wide"}),
+    "rest": frozenset({"track.strays", "track.grows", "track.clock_slips", "track.leaps", "video.backwards"}),
+}
 
 
 @dataclass(frozen=True)
@@ -59,6 +71,7 @@ class Outcome:
     scale_error: float = float("nan")
     localiser: str = ""
     warnings: str = ""
+    told: str = ""  # the keys of the warnings
     cpu_s: float = 0.0
     frames: int = 0
 
@@ -67,13 +80,30 @@ class Outcome:
         return not self.refused and self.ok_fraction >= 0.95 and max(self.rms_x_px, self.rms_y_px) <= 1
 
     @property
+    def wrong_in(self) -> tuple[str, ...]:
+        """What is wrong: position, zero, scale, rest."""
+        if self.refused:
+            return ()
+        far = {
+            "position": max(self.rms_x_px, self.rms_y_px) > 1,
+            "zero": self.zero_sigmas > 5,
+            "scale": self.scale_sigmas > 5,
+            "rest": self.rest_sigmas > 5,
+        }
+        return tuple(name for name, wrong in far.items() if wrong)
+
+    @property
     def wrong(self) -> bool:
-        far = max(self.rms_x_px, self.rms_y_px) > 1
-        return not self.refused and (far or max(self.zero_sigmas, self.scale_sigmas, self.rest_sigmas) > 5)
+        return bool(self.wrong_in)
 
     @property
     def silent_failure(self) -> bool:
         return self.wrong and not self.warnings
+
+    @property
+    def misled(self) -> bool:
+        """Something is wrong that no warning is about."""
+        return any(not ABOUT[name] & set(self.told.split()) for name in self.wrong_in)
 
 
 def measure(scene: Scene, video: Path, name: str = "") -> Outcome:
@@ -94,11 +124,17 @@ def measure(scene: Scene, video: Path, name: str = "") -> Outcome:
     ok, seen = found.ok, (truth.visible[row] > 0.995) & anew
     dx, dy = found.x_px - truth.x_px[row], found.y_px - truth.y_px[row]
     nx, ny = (dx / found.sigma_x_px)[ok], (dy / found.sigma_y_px)[ok]
-    theta = np.interp(series.t_s, found.t_s, truth.theta_rad[row])
-    if not scene.camera or "rolling_shutter" not in scene.camera.effects:
-        at = np.searchsorted(found.t_s, series.t_s - 1e-9)
-        theta = truth.theta_rad[row][np.minimum(at, row.size - 1)]
-    zero, scale, rest, scale_error = _theta_sigmas(series, theta)
+    rolls = scene.camera is not None and "rolling_shutter" in scene.camera.effects
+    used = row[ok] if ok.sum() == len(series) else row[np.isin(found.t_s, series.t_s)]
+    late = series.t_s - (truth.t_s[used] - truth.stamp_s[row[0]])  # stated time less the true one
+    path = truth.trajectory
+    rate = np.interp(truth.t_s[used], path.t_s, path.omega_rad_per_s)
+    if not rolls:
+        late = np.zeros_like(
+            late
+        )  # what is wrong with stamps shows in the angles: they are judged at the film's own times
+    theta = truth.theta_rad[used] + rate * late
+    zero, scale, rest, scale_error = _theta_sigmas(series, theta, rate if rolls else None)
     bound = cramer_rao_px(studio)
     pivot = np.array(series.meta.get("calibration", {}).get("pivot_px", found.pivot_px))
     return Outcome(
@@ -122,18 +158,21 @@ def measure(scene: Scene, video: Path, name: str = "") -> Outcome:
         scale_error=scale_error,
         localiser=found.localiser,
         warnings=" | ".join(series.meta.get("warnings", ())),
+        told=" ".join(getattr(w, "key", "") for w in series.meta.get("warnings", ())),
         cpu_s=cpu,
         frames=truth.frame.size,
     )
 
 
-def _theta_sigmas(series: Any, theta: np.ndarray) -> tuple[float, float, float, float]:
-    """How many stated σ the zero, the scale and the rest of θ are off; and the scale's relative error."""
-    design = np.stack([np.ones_like(theta), theta], axis=1)
+def _theta_sigmas(series: Any, theta: np.ndarray, rate: np.ndarray | None = None) -> tuple[float, float, float, float]:
+    """How many stated σ the zero, the scale and the rest of θ are off; and the scale's relative error. With a `rate` a
+    constant shift of time is no error."""
+    columns = [np.ones_like(theta), theta] + ([] if rate is None else [rate])
+    design = np.stack(columns, axis=1)
     sigma = series.sigma_theta_rad
-    (zero, factor), *_ = np.linalg.lstsq(design / sigma[:, None], series.theta_rad / sigma, rcond=None)
+    (zero, factor, *shift), *_ = np.linalg.lstsq(design / sigma[:, None], series.theta_rad / sigma, rcond=None)
     covariance = np.linalg.inv((design / sigma[:, None]).T @ (design / sigma[:, None]))
-    rest = series.theta_rad - zero - factor * theta
+    rest = series.theta_rad - design @ [zero, factor, *shift]
     u_zero = np.hypot(series.meta.get("vertical_sigma_rad") or 0.0, np.sqrt(covariance[0, 0]))
     u_scale = np.hypot(series.meta.get("angle_scale_relative_u") or 0.0, np.sqrt(covariance[1, 1]))
     return (
@@ -269,6 +308,24 @@ def run_scene(number: int, folder: Path) -> Outcome:
     return measure(scene, film, f"{number} {'+'.join(used)}")
 
 
+def _scene_alone(number: int, folder: Path, keep: bool) -> Outcome:
+    """`run_scene`, its clip removed unless it is to be kept."""
+    outcome = run_scene(number, folder)
+    if not keep:
+        (folder / f"scene{number:04d}.mkv").unlink()
+    return outcome
+
+
+def _each(numbers: Iterable[int], folder: Path, asked: argparse.Namespace) -> Iterator[Outcome]:
+    """The outcomes in order, from as many processes as asked for."""
+    keep = asked.keep is not None
+    if asked.jobs == 1:
+        yield from (_scene_alone(n, folder, keep) for n in numbers)
+        return
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        yield from pool.map(partial(_scene_alone, folder=folder, keep=keep), numbers)
+
+
 # --- the accuracy list -----------------------------------------------------------------------------------------------
 
 
@@ -394,8 +451,10 @@ def summarise(outcomes: list[Outcome]) -> str:
         f"locked                    {len(locked)} ({len(locked) / len(outcomes):.1%})",
         f"refused (exit 1)          {sum(bool(o.refused) for o in outcomes)}",
         f"SILENT FAILURES           {len(silent)}",
-        f"wrong, with a warning     {sum(o.wrong and bool(o.warnings) for o in outcomes)}",
-        f"right, with a warning     {sum(o.locked and not o.wrong and bool(o.warnings) for o in outcomes)}",
+        f"wrong, warned of it       {sum(o.wrong and not o.misled for o in outcomes)}",
+        f"wrong, warned of another  {sum(o.misled and bool(o.warnings) for o in outcomes)}",
+        f"right, with a warning     {sum(o.locked and not o.wrong and bool(o.warnings) for o in outcomes)}"
+        f" of {sum(o.locked and not o.wrong for o in outcomes)}",
         f"hidden frames called ok   {sum(o.hidden_ok for o in outcomes)}",
     ]
     if locked:
@@ -417,7 +476,7 @@ def summarise(outcomes: list[Outcome]) -> str:
                 f"  {effect:24s} {len(group):5d} {len(good):6d} {sum(o.silent_failure for o in group):6d}"
                 f"  {values[0]:7.4f} {values[1]:7.4f} {values[2]:7.4f}  {values[3]:5.2f} {values[4]:5.2f}"
             )
-    lines += ["", "not locked or silent:", *(describe(o) for o in outcomes if not o.locked or o.silent_failure)]
+    lines += ["", "not locked, or wrong:", *(describe(o) for o in outcomes if not o.locked or o.wrong)]
     return "\n".join(lines)
 
 
@@ -426,9 +485,9 @@ def describe(o: Outcome) -> str:
     if o.refused:
         return f"  {o.name}: refused: {o.refused}"
     return (
-        f"  {o.name}: {'SILENT ' if o.silent_failure else ''}ok {o.ok_fraction:.0%}, rms {o.rms_x_px:.3f} {o.rms_y_px:.3f} px, "
+        f"  {o.name}: {'SILENT ' if o.silent_failure else 'MISLED ' if o.misled else ''}ok {o.ok_fraction:.0%}, rms {o.rms_x_px:.3f} {o.rms_y_px:.3f} px, "
         f"pivot off {o.pivot_error_px:.1f} px, θ rms {o.theta_rms_deg:.3f}°, zero {o.zero_sigmas:.1f}σ, scale {o.scale_sigmas:.1f}σ "
-        f"({o.scale_error:+.2%}), rest {o.rest_sigmas:.1f}σ, {o.localiser}, warnings: {o.warnings[:160] or 'none'}"
+        f"({o.scale_error:+.2%}), rest {o.rest_sigmas:.1f}σ, error/σ {o.std_x:.2f} {o.std_y:.2f}, {o.localiser}, warnings: {o.warnings[:160] or 'none'}"
     )
 
 
@@ -438,6 +497,7 @@ def main() -> None:
     parser.add_argument("video", type=Path, nargs="?", help="for speed; by default a 10 s 720p clip is rendered")
     parser.add_argument("--count", type=int, default=8 * len(effect_names()))
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1, help="processes for scenes")
     parser.add_argument("--numbers", type=int, nargs="*", help="these scenes only")
     parser.add_argument("--keep", type=Path, help="folder of rendered clips, used again where they exist")
     parser.add_argument("--table", type=Path, help="write one row a clip to this CSV")
@@ -457,11 +517,9 @@ def main() -> None:
             outcomes = [outcome for outcome, _ in run_accuracy(folder)]
         else:
             outcomes = []
-            for number in asked.numbers or range(asked.first, asked.first + asked.count):
-                outcomes.append(run_scene(number, folder))
-                print(describe(outcomes[-1]), flush=True)
-                if not asked.keep:
-                    (folder / f"scene{number:04d}.mkv").unlink()
+            for outcome in _each(asked.numbers or range(asked.first, asked.first + asked.count), folder, asked):
+                outcomes.append(outcome)
+                print(describe(outcome), flush=True)
             print(summarise(outcomes))
     if asked.table:
         with asked.table.open("w", newline="", encoding="utf-8") as file:

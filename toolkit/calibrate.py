@@ -1,9 +1,8 @@
-"""From where the bob was in the picture to θ(t): the pivot, the vertical and the error bars.
+"""From where the bob was in the picture to θ(t): the pivot, the vertical, the camera's view and the error bars.
 
-Pivot: the centre of the arc (geometric least squares; for N points of scatter σ over ±θ₀ about the vertical the
-length is known to σ_L = 4√2·σ/(√N·θ₀²)·… of the arc's sagitta) and, where the string was seen, the point in which its
-lines meet. Vertical: the middle of the swing, from a fit that allows for decay. An error of the pivot along the
-vertical scales all angles alike, so it is kept apart from the random σ of each frame.
+The view (`toolkit.tracking.view`) is one fit of motion, pivot and camera to all positions and string lines. Each place is
+turned into an angle by it. What is common to all frames (the zero and the scale of all angles) is kept apart from the
+random σ of each frame; what the camera may have done beyond these two is in σ.
 """
 
 from __future__ import annotations
@@ -22,35 +21,39 @@ from toolkit.scene import Scene
 from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.track import LOST, PREDICTED, Track
-from toolkit.tracking.swing import fit_circle, fit_swing, start_swing
+from toolkit.tracking.pivot import PivotEstimate, arc_pivot, line_pivot
+from toolkit.tracking.swing import start_swing
+from toolkit.tracking.view import Lines, View, fit_view
+
+__all__ = ["arc_pivot", "calibrate", "line_pivot", "write_calibration_json"]
 
 _CLICK_SIGMA_PX = 1.0
-# What one picture plane cannot tell, as standard uncertainties of the scale of all angles. Alone, an arc or a string hides a
-# camera some 8° off square (1 − cos 8°) or a phone's uncorrected lens. Together they show either, save for what a pitch
-# of a few degrees from near adds to the arc's radius alone.
-_VIEW_U = 0.01
-_ARC_U = 0.006
+_ODD_PX = 0.3  # arc and string disagree by so much for reasons of their own (a string's shading, the bob's shadow)
+_VIEW_U = 0.01  # where no view could be fitted: a camera some 8° off square (1 − cos 8°), or a phone's uncorrected lens
+_WIDE_U = 0.05  # an uncertainty of all angles that the user must hear of
 
 
 @dataclass(frozen=True)
-class PivotEstimate:
-    """A pivot (x, y) in px with its (2, 2) covariance, how it was found, and the goodness of that fit.
+class _Angles:
+    """θ of the measured frames at their times with σ, and what is common to all of them."""
 
-    slant (2, 2) turns what was seen at a slant, about the pivot, into the plane of swing; None for a square view.
-    view_u is the relative standard uncertainty of all angles from what the camera's tilt and lens may have done.
-    """
-
-    xy: np.ndarray
-    covariance: np.ndarray
+    t_s: np.ndarray
+    theta_rad: np.ndarray
+    sigma_rad: np.ndarray
+    pivot_px: tuple[float, float]
+    pivot_sigma_px: tuple[float, float]
+    vertical_rad: float
+    vertical_sigma_rad: float
+    length_px: float
+    scale_u: float
+    scale_u_of_pivot: float
     method: str
-    reduced_chi2: float = 1.0
-    slant: np.ndarray | None = None
-    view_u: float = _VIEW_U
+    shown: tuple[str, ...] = ()
 
     @property
-    def sigma_px(self) -> tuple[float, float]:
-        """Standard uncertainties of x and y."""
-        return float(np.sqrt(self.covariance[0, 0])), float(np.sqrt(self.covariance[1, 1]))
+    def scale_u_of_view(self) -> float:
+        """What of the scale's uncertainty is the camera's."""
+        return float(np.sqrt(max(self.scale_u**2 - self.scale_u_of_pivot**2, 0.0)))
 
 
 def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
@@ -64,36 +67,30 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     t, x, y, sx, sy, kept = _measured(track)
     log = list(track.meta.get("log", []))
     warnings = list(track.meta.get("warnings", []))
-    pivot = _pivot(track, x, y, sx, sy, kept, log, warnings)
-    px, py = pivot.xy
-    if pivot.slant is not None:
-        x, y = pivot.xy[:, None] + pivot.slant @ np.array([x - px, y - py])
-        sx, sy = sx * pivot.slant[0, 0], sy * pivot.slant[1, 1]
-    direction = np.unwrap(np.arctan2(x - px, y - py))
-    distance = np.hypot(x - px, y - py)
-    length = float(np.median(distance))
-    vertical, vertical_sigma = _vertical(track, t, x, y, sx, sy, pivot)
-    theta = direction - vertical
-    sigma = np.hypot(np.cos(direction) * sx, np.sin(direction) * sy) / distance
+    arc, lines = arc_pivot(x, y, sx, sy), _string_pivot(track, kept)
+    view = _view(track, t, x, y, sx, sy, kept)
+    found = _plain(track, t, x, y, sx, sy, arc, lines) if view is None else _seen(view, t, x, y, sx, sy, lines)
     rounding = float(track.meta.get("time_sigma_s", 0.0))  # a file that keeps times to the millisecond only
+    sigma = found.sigma_rad
     if rounding > 0:
-        sigma = np.hypot(sigma, np.abs(np.gradient(direction, t)) * rounding)
-    scale_u = float(np.hypot(pivot.sigma_px[1] / length, pivot.view_u))
-    amplitude = float(np.percentile(np.abs(theta), 99))
+        sigma = np.hypot(sigma, np.abs(np.gradient(found.theta_rad, found.t_s)) * rounding)
+    amplitude = float(np.percentile(np.abs(found.theta_rad), 99))
+    apart = _disagreement(arc, lines, view, log)
     calibration: dict[str, Any] = {
-        "pivot_px": [float(px), float(py)],
-        "pivot_sigma_px": list(pivot.sigma_px),
-        "pivot_method": pivot.method,
-        "slant": None if pivot.slant is None else pivot.slant.tolist(),
+        "pivot_px": list(found.pivot_px),
+        "pivot_sigma_px": list(found.pivot_sigma_px),
+        "pivot_method": found.method,
+        "pivot_disagreement_sigma": apart,
+        "camera": {} if view is None else view.camera(),
         "radius_px": float(track.radius_px),
         "radius_sigma_px": float(track.meta.get("radius_sigma_px", 0.1)),
-        "vertical_rad": vertical,
-        "vertical_sigma_rad": vertical_sigma,
-        "angle_scale_relative_u": scale_u,
-        "angle_scale_relative_u_of_pivot": pivot.sigma_px[1] / length,
-        "angle_scale_relative_u_of_view": pivot.view_u,
-        "length_px": length,
-        "length_sigma_px": pivot.sigma_px[1],
+        "vertical_rad": found.vertical_rad,
+        "vertical_sigma_rad": found.vertical_sigma_rad,
+        "angle_scale_relative_u": found.scale_u,
+        "angle_scale_relative_u_of_pivot": found.scale_u_of_pivot,
+        "angle_scale_relative_u_of_view": found.scale_u_of_view,
+        "length_px": found.length_px,
+        "length_sigma_px": found.pivot_sigma_px[1],
         "fps": track.meta.get("fps"),
         "time_source": track.meta.get("time_source"),
         "frames": {
@@ -102,24 +99,24 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
             "lost": int((track.status == LOST).sum()),
         },
         "localiser": track.localiser,
-        **_scale(scene, length, track.radius_px, warnings),
+        **_scale(scene, found.length_px, track.radius_px, warnings),
     }
     log += [
         said(
             "calibrate.pivot",
             "Pivot at ({x_px:.2f}, {y_px:.2f}) px ± ({x_u_px:.2f}, {y_u_px:.2f}) px by {method}; pivot to bob {length_px:.2f} px.",
-            x_px=float(px),
-            y_px=float(py),
-            x_u_px=float(pivot.sigma_px[0]),
-            y_u_px=float(pivot.sigma_px[1]),
-            method=pivot.method,
-            length_px=float(length),
+            x_px=found.pivot_px[0],
+            y_px=found.pivot_px[1],
+            x_u_px=found.pivot_sigma_px[0],
+            y_u_px=found.pivot_sigma_px[1],
+            method=found.method,
+            length_px=found.length_px,
         ),
         said(
             "calibrate.vertical",
             "The vertical is the middle of the decaying swing: {angle_deg:.3f}° ± {u_deg:.3f}° from the picture's own.",
-            angle_deg=float(np.degrees(vertical)),
-            u_deg=float(np.degrees(vertical_sigma)),
+            angle_deg=float(np.degrees(found.vertical_rad)),
+            u_deg=float(np.degrees(found.vertical_sigma_rad)),
         ),
         said(
             "calibrate.errors",
@@ -127,33 +124,51 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
             "{common:.2g} ({by_pivot:.2g} from the pivot, {by_view:.2g} from the camera's view).",
             widest_deg=float(np.degrees(amplitude)),
             frame_deg=float(np.degrees(np.median(sigma))),
-            common=float(scale_u),
-            by_pivot=float(pivot.sigma_px[1] / length),
-            by_view=float(pivot.view_u),
+            common=found.scale_u,
+            by_pivot=found.scale_u_of_pivot,
+            by_view=found.scale_u_of_view,
         ),
     ]
-    if pivot.slant is None and pivot.view_u >= _VIEW_U:
+    if view is not None and view.shown:
+        effects = ", ".join(f"{name} {value:.3g}" for name, value in view.camera().items())
+        log.append(
+            said(
+                "calibrate.camera",
+                "The clip shows what the camera did, and it was taken out: {effects}.",
+                effects=effects,
+            )
+        )
+    elif found.scale_u_of_view >= _VIEW_U:
         log.append(
             said(
                 "calibrate.view",
                 "Camera tilt not distinguishable from this clip: angles may be scaled by about {share:.1%} (assumed: a camera "
-                "within some 8° of square, or a phone's lens). A visible string and a larger swing would tell.",
-                share=float(pivot.view_u),
+                "within some 10° of square, or a phone's lens). A visible string and a larger swing would tell.",
+                share=found.scale_u_of_view,
+            )
+        )
+    if found.scale_u > _WIDE_U:
+        warnings.append(
+            said(
+                "calibrate.wide",
+                "all angles may be scaled by {share:.1%}: this clip tells neither the pivot nor the camera's tilt better; give "
+                "--pivot X,Y, or film with the string in view and a larger swing",
+                share=found.scale_u,
             )
         )
     meta = {
         "source": track.meta.get("source", "track"),
         "log": log,
         "warnings": warnings,
-        "angle_scale_relative_u": scale_u,
-        "angle_scale_relative_u_of_view": pivot.view_u,
-        "vertical_sigma_rad": vertical_sigma,
+        "angle_scale_relative_u": found.scale_u,
+        "angle_scale_relative_u_of_view": found.scale_u_of_view,
+        "vertical_sigma_rad": found.vertical_sigma_rad,
         "exposure_s": track.meta.get("exposure_s"),
         "calibration": calibration,
     }
     if scene is not None and scene.pendulum.length_m is not None:
         meta["length_m"] = scene.pendulum.length_m
-    return ThetaSeries(t, theta, np.maximum(sigma, 1e-9), meta)
+    return ThetaSeries(found.t_s, found.theta_rad, np.maximum(sigma, 1e-9), meta)
 
 
 def write_calibration_json(series: ThetaSeries, path: str | Path) -> None:
@@ -183,74 +198,99 @@ def _measured(track: Track) -> tuple[np.ndarray, ...]:
     return t[rising], x[rising], y[rising], sx, sy, kept
 
 
-def arc_pivot(x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray) -> PivotEstimate | None:
-    """The centre of the arc through points (n,) with standard uncertainties; None where they do not bend."""
-    cx, cy, radius, _ = fit_circle(x, y, 1 / (sx * sy))
-    if not np.isfinite(radius):
-        return None
-    ux, uy = (x - cx) / radius, (y - cy) / radius
-    sigma = np.hypot(ux * sx, uy * sy)
-    rest = (np.hypot(x - cx, y - cy) - radius) / sigma
-    jacobian = np.column_stack([-ux, -uy, -np.ones(x.size)]) / sigma[:, None]
-    chi2 = float(rest @ rest) / max(1, x.size - 3)
-    try:
-        covariance = np.linalg.inv(jacobian.T @ jacobian) * max(1.0, chi2)
-    except np.linalg.LinAlgError:
-        return None
-    return PivotEstimate(np.array([cx, cy]), covariance[:2, :2], said("pivot.arc", "the arc of the bob"), chi2)
-
-
-def line_pivot(x: np.ndarray, y: np.ndarray, angle: np.ndarray, sigma: np.ndarray) -> PivotEstimate | None:
-    """The point nearest to lines (n,) through (x, y) with direction `angle` (rad from the downward image axis,
-    positive to the right) and `sigma` (px) their distance errors at the pivot. None for fewer than 8 lines."""
-    if x.size < 8:
-        return None
-    nx, ny = np.cos(angle), -np.sin(angle)
-    offset = nx * x + ny * y
-    weight = 1 / sigma**2
-    for _ in range(6):
-        normal = np.array(
-            [[np.sum(weight * nx * nx), np.sum(weight * nx * ny)], [np.sum(weight * nx * ny), np.sum(weight * ny * ny)]]
-        )
-        try:
-            covariance = np.linalg.inv(normal)
-        except np.linalg.LinAlgError:
+def _view(
+    track: Track, t: np.ndarray, x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray, kept: np.ndarray
+) -> View | None:
+    """The track's own view, or one fitted to it; None where the motion is no free swing."""
+    known = track.meta.get("view")
+    if known is None:
+        start = start_swing(t, x, y)
+        if start is None:
             return None
-        xy = covariance @ np.array([np.sum(weight * nx * offset), np.sum(weight * ny * offset)])
-        rest = (nx * xy[0] + ny * xy[1] - offset) / sigma
-        spread = 1.4826 * np.median(np.abs(rest)) + 1e-12
-        weight = np.where(np.abs(rest) < 4 * spread, 1 / sigma**2, 0.0)
-    used = weight > 0
-    chi2 = float(np.sum(rest[used] ** 2)) / max(1, int(used.sum()) - 2)
-    return PivotEstimate(xy, covariance * max(1.0, chi2), said("pivot.lines", "the string's lines"), chi2)
+        size = (int(track.meta.get("width_px", 2 * x.max())), int(track.meta.get("height_px", 2 * y.max())))
+        clicked = (*track.pivot_px, _CLICK_SIGMA_PX) if track.meta.get("pivot_given") else None
+        known = fit_view(t, x, y, sx, sy, start, size, _lines(track, kept), clicked)
+        if known is None:
+            return None
+    direction = np.unwrap(np.arctan2(x - known.pivot_px[0], y - known.pivot_px[1]))
+    off = known["vertical"] - 0.5 * (direction.max() + direction.min())
+    driven = not known.shown and abs(off) > 0.3 * float(np.ptp(direction))
+    return None if driven else known
 
 
-def _pivot(
-    track: Track,
+def _seen(
+    view: View,
+    t: np.ndarray,
     x: np.ndarray,
     y: np.ndarray,
     sx: np.ndarray,
     sy: np.ndarray,
-    kept: np.ndarray,
-    log: list[str],
-    warnings: list[str],
-) -> PivotEstimate:
+    lines: PivotEstimate | None,
+) -> _Angles:
+    """Angles by the view."""
+    theta, (tx, ty) = view.angles(t, x, y)
+    zero_u, scale_u, scale_u_of_pivot, other = view.uncertainty(t, x, y)
+    random = np.hypot(tx * sx, ty * sy) / (tx * tx + ty * ty)
+    arc = said("pivot.arc", "the arc of the bob")
+    return _Angles(
+        view.row_time(t, x, y),
+        theta,
+        np.hypot(random, other),
+        view.pivot_px,
+        view.pivot_sigma_px,
+        view["vertical"],
+        zero_u,
+        view["length"],
+        scale_u,
+        min(scale_u_of_pivot, scale_u),
+        arc if lines is None else said("pivot.both", "the arc and the string's lines together"),
+        view.shown,
+    )
+
+
+def _plain(
+    track: Track,
+    t: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    sx: np.ndarray,
+    sy: np.ndarray,
+    arc: PivotEstimate | None,
+    lines: PivotEstimate | None,
+) -> _Angles:
+    """Angles where the motion is no free swing: about the pivot given, the string's, or the arc's; from the middle."""
+    pivot = lines or arc
     if track.meta.get("pivot_given"):
-        sigma = max(
-            _CLICK_SIGMA_PX, *(track.pivot_sigma_px if np.all(np.isfinite(track.pivot_sigma_px)) else (0.0, 0.0))
-        )
-        return PivotEstimate(
-            np.array(track.pivot_px, float), np.eye(2) * sigma**2, said("pivot.given", "the position given")
-        )
-    arc = arc_pivot(x, y, sx, sy)
-    lines = _string_pivot(track, kept)
-    if arc is None and lines is None:
+        given = said("pivot.given", "the position given")
+        pivot = PivotEstimate(np.array(track.pivot_px, float), np.eye(2) * _CLICK_SIGMA_PX**2, given)
+    if pivot is None:
         raise JobError("the bob's path does not bend and no string is seen: give --pivot X,Y")
+    px, py = (float(v) for v in pivot.xy)
+    direction = np.unwrap(np.arctan2(x - px, y - py))
+    distance = np.hypot(x - px, y - py)
+    length = float(np.median(distance))
+    sigma = np.hypot(np.cos(direction) * sx, np.sin(direction) * sy) / distance
+    middle = float(0.5 * (direction.max() + direction.min()))
+    by_pivot = pivot.sigma_px[1] / length
+    return _Angles(
+        t,
+        direction - middle,
+        sigma,
+        (px, py),
+        pivot.sigma_px,
+        middle,
+        float(np.ptp(direction) / 20),
+        length,
+        float(np.hypot(by_pivot, _VIEW_U)),
+        by_pivot,
+        pivot.method,
+    )
+
+
+def _disagreement(arc: PivotEstimate | None, lines: PivotEstimate | None, view: View | None, log: list[str]) -> float:
+    """By how many σ the pivots by the arc and by the string's lines differ, where no camera effect was taken out for it."""
     if arc is None or lines is None:
-        return arc if lines is None else lines  # type: ignore[return-value]
-    difference = arc.xy - lines.xy
-    both = arc.covariance + lines.covariance
-    chi2 = float(difference @ np.linalg.solve(both, difference))
+        return 0.0
     log.append(
         said(
             "calibrate.two_pivots",
@@ -262,97 +302,30 @@ def _pivot(
             lines_y_px=float(lines.xy[1]),
         )
     )
-    together = said("pivot.both", "the arc and the string's lines together")
-    gain = arc.covariance @ np.linalg.inv(both)
-    xy = arc.xy - gain @ difference
-    covariance = arc.covariance - gain @ arc.covariance
-    # a view that scales angles by 1 + ε scales the arc's radius by 1 + 2ε against the string's length
-    away = float(np.hypot(*(np.mean([x, y], axis=1) - xy)))
-    apart = np.hypot(float(np.hypot(*difference)) if chi2 > 11.8 else 0.0, np.sqrt(both[1, 1])) / away
-    view_u = 0.5 * float(np.hypot(apart, _ARC_U))
-    if chi2 > 11.8:  # 3σ for two numbers
-        differ = said(
-            "calibrate.pivots_differ",
-            "the pivot by the arc and by the string differ by {apart_px:.1f} px ({sigmas:.0f}σ): the camera was tilted, its lens "
-            "distorts, or the bob swung out of the plane",
-            apart_px=float(np.hypot(*difference)),
-            sigmas=float(np.sqrt(chi2)),
-        )
-        slant = _slant(x - lines.xy[0], y - lines.xy[1])
-        if slant is None:
-            wrong = "{differ}; angles may be wrong by about {share:.1%}"
-            warnings.append(said("calibrate.pivots_kept", wrong, differ=differ, share=view_u))
-            return PivotEstimate(xy, covariance * chi2 / 2, together, chi2, view_u=view_u)
-        # seen at a slant a circle is an ellipse; the string's lines still meet in its centre
-        small, large = np.linalg.eigvalsh(slant)
-        tilt = float(np.degrees(np.arccos(small / large)))
-        warnings.append(
-            said(
-                "calibrate.slant",
-                "{differ}; read as a view at a slant of {slant_deg:.0f}°, which was taken out; for it angles are uncertain by "
-                "{share:.1%}",
-                differ=differ,
-                slant_deg=tilt,
-                share=float((large / small - 1) / 3),
-            )
-        )
-        view_u = max(_ARC_U / 2, (large / small - 1) / 3)
-        slanted = said("pivot.slanted", "the string's lines, the arc seen at a slant")
-        return PivotEstimate(lines.xy, lines.covariance, slanted, chi2, slant, view_u)
-    return PivotEstimate(xy, covariance, together, view_u=min(view_u, _VIEW_U))
+    if view is not None and view.shown:
+        return 0.0
+    inflation = 1.0 if view is None else max(1.0, view.inflation)
+    both = (arc.covariance + lines.covariance) * inflation**2 + np.eye(2) * _ODD_PX**2
+    difference = arc.xy - lines.xy
+    return float(np.sqrt(difference @ np.linalg.solve(both, difference)))
 
 
-def _slant(dx: np.ndarray, dy: np.ndarray) -> np.ndarray | None:
-    """The symmetric (2, 2) matrix that turns the ellipse about (0, 0) through the points into a circle of about the same
-    size; None where the points lie on no such ellipse or it is very flat."""
-    size = float(np.median(np.hypot(dx, dy)))
-    u, v = dx / size, dy / size
-    a, b, c = np.linalg.lstsq(np.column_stack([u * u, u * v, v * v]), np.ones(u.size), rcond=None)[0]
-    values, vectors = np.linalg.eigh(np.array([[a, b / 2], [b / 2, c]]))
-    if values[0] <= 0 or not 1.03 < values[1] / values[0] < 4:  # less than 10° a bent lens does as well
+def _lines(track: Track, kept: np.ndarray) -> Lines | None:
+    """The string's lines on the measured frames; None where there are few."""
+    if track.meta.get("string_angle_rad") is None:
         return None
-    return np.asarray(vectors @ np.diag(np.sqrt(values)) @ vectors.T)
+    names = ("x_px", "y_px", "angle_rad", "angle_sigma_rad", "sigma_px")
+    columns = [np.asarray(track.meta[f"string_{n}"])[kept] for n in names]
+    good = np.isfinite(columns[2])
+    return Lines(*(c[good] for c in columns)) if good.sum() >= 8 else None
 
 
 def _string_pivot(track: Track, kept: np.ndarray) -> PivotEstimate | None:
-    if track.meta.get("string_angle_rad") is None:
+    k = _lines(track, kept)
+    if k is None:
         return None
-    x, y, angle, turn, place = (
-        np.asarray(track.meta[f"string_{n}"])[kept]
-        for n in ("x_px", "y_px", "angle_rad", "angle_sigma_rad", "sigma_px")
-    )
-    good = np.isfinite(angle)
-    if good.sum() < 8:
-        return None
-    reach = np.hypot(x - track.pivot_px[0], y - track.pivot_px[1])
-    return line_pivot(x[good], y[good], angle[good], np.hypot(turn * reach, place)[good] + 1e-3)
-
-
-def _vertical(
-    track: Track, t: np.ndarray, x: np.ndarray, y: np.ndarray, sx: np.ndarray, sy: np.ndarray, pivot: PivotEstimate
-) -> tuple[float, float]:
-    """Direction of rest in the picture and its σ: a decaying swing fitted with the pivot held.
-
-    Where the motion is no free swing (a driven one), the middle between the extremes, with a wide σ.
-    """
-    px, py = pivot.xy
-    direction = np.unwrap(np.arctan2(x - px, y - py))
-    length = float(np.median(np.hypot(x - px, y - py)))
-    middle = float(0.5 * (direction.max() + direction.min()))
-    wide = middle, float(np.ptp(direction) / 20)
-    known = track.meta.get("swing")
-    start = start_swing(t, x, y) if known is None else np.array(known, float)
-    if start is None:
-        return wide
-    turned = np.arctan2(start[0] - px, length) * (1 if known is not None else 0)
-    start[:4] = px, py, length, start[3] + turned
-    every = max(1, t.size // 2000)
-    free = ("length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0")
-    sigma = np.maximum(np.sqrt(sx * sy), 1e-4)
-    swing = fit_swing(t[::every], x[::every], y[::every], sigma[::every], start, free=free)
-    if swing is None or abs(swing.values[3] - middle) > 0.3 * np.ptp(direction):
-        return wide
-    return float(swing.values[3]), float(np.sqrt(max(swing.covariance[3, 3], 1e-18)))
+    reach = np.hypot(k.x_px - track.pivot_px[0], k.y_px - track.pivot_px[1])
+    return line_pivot(k.x_px, k.y_px, k.angle_rad, np.hypot(k.sigma_rad * reach, k.sigma_px) + 1e-3)
 
 
 def _scale(scene: Scene | None, length_px: float, radius_px: float, warnings: list[str]) -> dict[str, Any]:

@@ -67,6 +67,8 @@ class Anchors:
         moved = np.zeros((n, 4))
         _compiled()(luma, self.windows, self.points, self._last, moved)
         good = moved[:, 3] > 0
+        if good.sum() < 2:
+            return None
         sigma = np.sqrt(moved[:, 2] ** 2 + 0.01**2)
         middle = np.median(moved[good, :2], axis=0)
         off = np.hypot(*(moved[:, :2] - middle).T)

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from toolkit.tracking.least_squares import least_squares
+
 NAMES = ("pivot_x", "pivot_y", "length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0")
 
 
@@ -35,6 +37,11 @@ class Swing:
         return float(self.values[0]), float(self.values[1])
 
     @property
+    def pivot_sigma_px(self) -> tuple[float, float]:
+        """Standard uncertainties of the pivot."""
+        return float(np.sqrt(self.covariance[0, 0])), float(np.sqrt(self.covariance[1, 1]))
+
+    @property
     def length_px(self) -> float:
         """Pivot to bob centre."""
         return float(self.values[2])
@@ -53,7 +60,7 @@ class Swing:
         backward = ahead[t[ahead] < 0][::-1]
         for order in (forward, backward):
             if order.size:
-                out[:, order] = _solve(self.values, t[order])
+                out[:, order] = solve_swing(self.values, t[order])
         return out[0], out[1]
 
     def position(self, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -107,7 +114,8 @@ def _compiled() -> Any:
     return swing_rk4
 
 
-def _solve(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """(2, n): θ and its rate at times t (n,) after that of the state in `values`."""
     out = np.empty((2, t.size))
     _compiled()(values[4], values[5], values[6], values[7], values[8], np.ascontiguousarray(t), out)
     return out
@@ -137,54 +145,24 @@ def fit_swing(
     tied = {NAMES.index(name): pair for name, pair in (prior or {}).items() if name in free}
 
     def rest(values: np.ndarray) -> np.ndarray:
-        x, y = _place(values, _solve(values, t)[0])
+        x, y = _place(values, solve_swing(values, t)[0])
         pulls = [(values[i] - value) / sigma for i, (value, sigma) in tied.items()]
         return np.concatenate([(x - x_px) * weight, (y - y_px) * weight, pulls])
 
-    values = np.array(start, float)
-    scale = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-6 * abs(values[4]), 1e-6, 1e-6, 1e-6, 1e-6])
-    now = rest(values)
-    cost = float(now @ now)
-    if not np.isfinite(cost):
+    steps = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-6 * abs(start[4]), 1e-6, 1e-6, 1e-6, 1e-6])
+    least = least_squares(rest, start, steps, index, turns=turns)
+    if least is None:
         return None
-    damping = 1e-3
-    jacobian = np.empty((now.size, len(index)))
-    for _ in range(turns):
-        for column, i in enumerate(index):
-            moved = values.copy()
-            moved[i] += scale[i]
-            jacobian[:, column] = (rest(moved) - now) / scale[i]
-        normal, pull = jacobian.T @ jacobian, jacobian.T @ now
-        done = False
-        for _ in range(8):
-            try:
-                step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-300), pull)
-            except np.linalg.LinAlgError:
-                return None
-            trial = values.copy()
-            trial[index] += step
-            after = rest(trial)
-            trial_cost = float(after @ after)
-            if np.isfinite(trial_cost) and trial_cost <= cost:
-                done = cost - trial_cost <= 1e-7 * cost
-                values, now, cost = trial, after, trial_cost
-                damping = max(damping / 10, 1e-12)
-                break
-            damping *= 10
-        else:
-            break
-        if done:
-            break
     dof = max(1, 2 * t.size - len(index))
-    chi2 = float(now[: 2 * t.size] @ now[: 2 * t.size])
+    chi2 = float(least.rest[: 2 * t.size] @ least.rest[: 2 * t.size])
     covariance = np.zeros((9, 9))
     try:
-        covariance[np.ix_(index, index)] = np.linalg.inv(normal) * max(chi2 / dof, 1e-300)
+        covariance[np.ix_(index, index)] = np.linalg.inv(least.normal) * max(chi2 / dof, 1e-300)
     except np.linalg.LinAlgError:
         return None
-    x, y = _place(values, _solve(values, t)[0])
+    x, y = _place(least.values, solve_swing(least.values, t)[0])
     rms = float(np.sqrt((np.sum((x - x_px) ** 2) + np.sum((y - y_px) ** 2)) / dof))
-    return Swing(values, covariance, t0, rms) if np.all(np.isfinite(values)) else None
+    return Swing(least.values, covariance, t0, rms)
 
 
 def fit_circle(x: np.ndarray, y: np.ndarray, weight: np.ndarray | None = None) -> tuple[float, float, float, float]:

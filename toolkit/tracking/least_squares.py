@@ -1,0 +1,74 @@
+"""Least squares of a few parameters, by Levenberg–Marquardt with forward differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Minimum(NamedTuple):
+    """Where the sum of squares is least: all parameters, the residuals there, and the normal matrix of the free ones."""
+
+    values: np.ndarray
+    rest: np.ndarray
+    normal: np.ndarray
+
+    @property
+    def chi2(self) -> float:
+        """Sum of the squared residuals."""
+        return float(self.rest @ self.rest)
+
+
+def least_squares(
+    rest: Callable[[np.ndarray], np.ndarray],
+    start: np.ndarray,
+    steps: np.ndarray,
+    free: Sequence[int],
+    *,
+    turns: int = 25,
+    settled: float = 1e-7,
+) -> Minimum | None:
+    """Minimise |rest(values)|² over values[free] from `start`; `steps` are the differences' steps, one a value.
+
+    Ends after `turns` or where a step gains less than the fraction `settled`. None where numbers are not finite.
+    """
+    index = list(free)
+    values = np.array(start, float)
+    now = rest(values)
+    cost = float(now @ now)
+    if not np.isfinite(cost):
+        return None
+    damping = 1e-3
+    jacobian = np.empty((now.size, len(index)))
+    normal = np.empty((len(index), len(index)))
+    for _ in range(turns):
+        for column, i in enumerate(index):
+            moved = values.copy()
+            moved[i] += steps[i]
+            jacobian[:, column] = (rest(moved) - now) / steps[i]
+        normal, pull = jacobian.T @ jacobian, jacobian.T @ now
+        if not np.all(np.isfinite(normal)):
+            return None
+        done = False
+        for _ in range(8):
+            try:
+                step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-300), pull)
+            except np.linalg.LinAlgError:
+                return None
+            trial = values.copy()
+            trial[index] += step
+            after = rest(trial)
+            trial_cost = float(after @ after)
+            if np.isfinite(trial_cost) and trial_cost <= cost:
+                done = cost - trial_cost <= settled * cost
+                values, now, cost = trial, after, trial_cost
+                damping = max(damping / 10, 1e-12)
+                break
+            damping *= 10
+        else:
+            break
+        if done:
+            break
+    return Minimum(values, now, normal) if np.all(np.isfinite(values)) else None

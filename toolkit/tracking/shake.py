@@ -1,0 +1,74 @@
+"""The camera's shake over the whole clip, smoothed as far as its own noise asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.sentence import said
+from toolkit.tracking.follow import Follower
+from toolkit.tracking.stillness import CameraShift
+
+
+class Shake:
+    """How far the camera's shake moved the bob's place on each frame, smoothed as far as its own noise asks for.
+
+    raw_x, raw_y (n,) were taken away while following (0 where the camera seemed to stand still), x, y (n,) are to be.
+    """
+
+    def __init__(self, follower: Follower, good: np.ndarray, log: list[str]) -> None:
+        r = follower.record
+        n = len(r.index)
+        self.raw_x, self.raw_y, self.sigma = np.zeros(n), np.zeros(n), np.zeros(n)
+        self.x, self.y = self.raw_x, self.raw_y
+        known: dict[int, CameraShift] = {**follower.checks, **{k: s for k, s in enumerate(r.shift) if s is not None}}
+        if not follower.shaking or not known:
+            return
+        at = np.array(sorted(known))
+        rows = np.array([known[k][:3] for k in at])
+        shifts = np.column_stack([np.interp(np.arange(n), at, column) for column in rows.T])
+        first = next(k for k in range(n) if r.shift[k] is not None)
+        smooth = shifts.copy()
+        smooth[first:], noise = _smoothed(shifts[first:])
+        one = next(iter(known.values()))
+        self.x, self.y = np.zeros(n), np.zeros(n)
+        for k, p in enumerate(r.place):
+            where = (p.x_px, p.y_px) if good[k] else (one.centre_x_px, one.centre_y_px)
+            self.x[k], self.y[k] = one._replace(x_px=smooth[k, 0], y_px=smooth[k, 1], roll_rad=smooth[k, 2]).at(*where)
+            if k >= first:
+                self.raw_x[k], self.raw_y[k] = r.shift[k].at(*where)  # type: ignore[union-attr]
+        self.sigma = np.full(n, noise)
+        extent = np.ptp(shifts, axis=0)
+        log.append(
+            said(
+                "track.shake",
+                "The camera moved by up to {across_px:.1f} px across and {down_px:.1f} px down; this was measured on the still "
+                "background (to {noise_px:.3f} px a frame) and taken away.",
+                across_px=float(extent[0]),
+                down_px=float(extent[1]),
+                noise_px=float(noise),
+            )
+        )
+
+
+def _smoothed(values: np.ndarray) -> tuple[np.ndarray, float]:
+    """Columns of `values` (n, k) by local parabolas over the longest window that adds no misfit; and what noise is left."""
+    n = len(values)
+    if n < 12:
+        return values, 0.0
+    third = values[3:] - 3 * values[2:-1] + 3 * values[1:-2] - values[:-3]
+    noise = float(1.4826 * np.median(np.abs(third)) / np.sqrt(20))
+    best, left = values, noise
+    for width in (5, 9, 15, 25, 41):
+        if width > n // 2:
+            break
+        half = width // 2
+        at = np.arange(-half, half + 1)
+        kernel = np.linalg.pinv(np.vander(at, 3, increasing=True))[0]
+        padded = np.pad(values, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
+        smooth = np.column_stack([np.convolve(c, kernel[::-1], "valid") for c in padded.T])
+        rest = values - smooth
+        own = noise * np.sqrt(1 - kernel[half])
+        if np.sqrt(np.mean(rest**2)) > 1.25 * own + 1e-4:
+            break
+        best, left = smooth, noise * float(np.sqrt(kernel[half]))
+    return best, left

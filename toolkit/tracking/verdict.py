@@ -1,0 +1,84 @@
+"""Is what was followed a pendulum, and how good a one?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from toolkit.errors import JobError
+from toolkit.sentence import said
+from toolkit.tracking.acquire import REMEDY
+from toolkit.tracking.swing import Swing
+
+
+def require_pendulum(swing: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray, path: Path) -> None:
+    span = float(t[good][-1] - t[good][0])
+    if span < 0.5 * swing.period_s:
+        raise JobError(
+            f"{path} shows {span:.2f} s, less than half a period ({0.5 * swing.period_s:.2f} s); film at least one period"
+        )
+    extent = float(np.hypot(np.ptp(x[good]), np.ptp(y[good])))
+    amplitude = swing.amplitude_rad(t[good])
+    reasons = []
+    if swing.rms_px > max(0.04 * extent, 0.3):
+        reasons.append(f"it strays {swing.rms_px:.1f} px from a swing of {extent:.0f} px")
+    if good.mean() < 0.6 and swing.rms_px > 0.015 * extent:
+        reasons.append(f"it was seen on {good.mean():.0%} of the frames, straying {swing.rms_px:.1f} px")
+    if not 0 < amplitude < np.pi:
+        reasons.append("it does not turn back")
+    growth, growth_sigma = _growth(swing, t[good])
+    if growth - 3 * growth_sigma > 0.5:
+        reasons.append(f"its swing grows by {np.expm1(growth):.0%}")
+    if swing.values[4] <= 0:
+        reasons.append("nothing pulls it back")
+    if reasons:
+        raise JobError(f"what moves in {path} is no pendulum ({reasons[0]}); if there is one, {REMEDY}")
+
+
+def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:
+    """How much the amplitude grew from the first to the last time (natural logarithm), and its standard uncertainty."""
+    ends = np.array([t[0], t[-1]])
+
+    def grown(values: np.ndarray) -> float:
+        theta, rate = Swing(values, swing.covariance, swing.t0_s, swing.rms_px).angle(ends)
+        energy = 0.5 * rate**2 + values[4] * (1 - np.cos(theta))
+        return 0.5 * float(np.log(max(energy[1], 1e-12) / max(energy[0], 1e-12)))
+
+    now = grown(swing.values)
+    sigma = np.sqrt(np.diag(swing.covariance))
+    slope = np.zeros(sigma.size)
+    for i in range(4, 9):
+        moved = swing.values.copy()
+        moved[i] += 0.1 * sigma[i]
+        slope[i] = (grown(moved) - now) / (0.1 * sigma[i]) if sigma[i] > 0 else 0.0
+    return now, float(np.sqrt(max(slope @ swing.covariance @ slope, 0.0)))
+
+
+def poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, rms_px: float, sigma_px: float) -> list[str]:
+    """Sentences on a motion that was accepted, but is not quite that of a pendulum; `rms_px` is how far places stray from
+    it as the camera saw it, `sigma_px` a place's error bar."""
+    poor: list[str] = []
+    growth, sigma = _growth(swing, t[good])
+    if growth > 0.02 + 4 * sigma:
+        poor.append(
+            said(
+                "track.grows",
+                "the swing grows by {share:.1%}: it is driven, or swings towards the camera by turns; a free decay does not "
+                "describe it",
+                share=float(np.expm1(growth)),
+            )
+        )
+    if rms_px > max(0.15, 3 * sigma_px):
+        poor.append(
+            said(
+                "track.strays",
+                "the bob's places stray {rms_px:.2f} px (rms) from a pendulum's swing, whatever tilt and lens the camera had: the "
+                "camera shook, the pendulum was driven or touched, or the bob was not followed well",
+                rms_px=rms_px,
+            )
+        )
+    if good.mean() < 0.7:
+        share = float(good.mean())
+        poor.append(said("track.few", "the bob was measured on only {share:.0%} of the frames", share=share))
+    return poor
