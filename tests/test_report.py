@@ -165,7 +165,7 @@ def test_thai_says_the_same_numbers(english, thai):
 
 
 def test_every_finding_is_said_in_both_languages(analysis):
-    from toolkit.report.build import sentence
+    from toolkit.report.speech import sentence
     from toolkit.report.words import load_words
 
     for finding in analysis.findings:
@@ -185,6 +185,76 @@ def test_every_words_key_of_the_checks_is_known():
     assert len(keys) > 10
     table = load_words("th").table
     assert sorted(key for key in keys if f"finding.{key}" not in table) == []
+
+
+UNITS = "s ms m cm mm px kg g N J Hz mrad nrad rad ppm rms AIC BIC CPU dof sin cos ln"
+SYMBOLS = "a c f h k m v s t x y A B E F N Q T U X Y L K d g eq offset dt"
+NAMES = "pendulab JCGM GUM Tracker phyphox DOP853 Rodas4 fps factor start stop mass length cosine drive slack string"
+LATIN_IN_THAI = {word for words in (UNITS, SYMBOLS, NAMES) for word in words.split()}
+
+
+def latin_words(report) -> set[str]:
+    """The Latin words of a report, but for file names, quoted names, the equation and the titles of references."""
+
+    def texts():
+        yield report.title
+        yield report.lead
+        yield report.footer
+        for fact in report.facts:
+            yield from (fact.question, fact.answer, fact.remark)
+        for verdict in report.verdicts:
+            yield from (verdict.title, verdict.label, verdict.sentence, verdict.remedy)
+        for section in report.sections:
+            yield section.title
+            for block in section.blocks if section.key != "references" else ():
+                yield from (getattr(block, "caption", ""), getattr(block, "text", ""))
+                yield from getattr(block, "items", ())
+                yield from (cell for row in getattr(block, "rows", ()) for cell in row)
+                yield from getattr(block, "header", ())
+        yield from (figure.caption for figure in report.figures)
+
+    found = set()
+    for text in texts():
+        text = re.sub(r"'[^']*'|\S+\.(?:csv|txt|trk|mov|mp4)\b|\d+\.\d+\.\d+", " ", bare(text))
+        found |= set(re.findall(r"[A-Za-z][A-Za-z0-9]*", text))
+    return found - LATIN_IN_THAI
+
+
+def test_a_thai_report_is_thai(analysis):
+    """And a sentence without words in Thai would be seen."""
+    quiet = replace(analysis, series=replace(analysis.series, meta={}))
+    assert latin_words(build_report(quiet, "th")) == set()
+    assert latin_words(build_report(analysis, "th")) == {
+        "Measured",
+        "with",
+        "ruler",
+        "clock",
+        "is",
+        "The",
+        "table",
+        "wobbled",
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "stop_s"),
+    [
+        ("pendulum.mp4", 4.0),
+        ("redapple/redapple_480p.mov", 4.0),
+        ("yyz/lab1_tracker.txt", 40.0),
+        ("jlefebvre/q2_data.txt", None),
+        ("jlefebvre/pendulum_length1.trk", None),
+    ],
+)
+def test_thai_reports_of_recordings_are_thai(name, stop_s, request):
+    from toolkit.analyse import analyse
+
+    shipped = Path(__file__).parents[1] / "data" / "samples" / name
+    path = shipped if shipped.is_file() else request.getfixturevalue("shared_data") / name
+    models = ("small_angle_linear_drag", "full_linear_drag", "full_linear_quadratic_coulomb")
+    found = analyse(path, models=models, stop_s=stop_s)
+    assert found.log
+    assert latin_words(build_report(found, "th")) == set()
 
 
 def test_references_are_those_used(analysis, english):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import string
 from datetime import date
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 
@@ -25,10 +27,41 @@ def test_english_and_thai_are_there():
 @pytest.mark.parametrize("lang", languages())
 def test_keys_and_blanks_agree(lang):
     english, other = load_words("en").table, load_words(lang).table
-    assert set(other) == set(english)
+    assert {key for key in other if not key.startswith("said.")} == set(english)
     for key, text in english.items():
         assert blanks(other[key]) == blanks(text), key
         assert other[key].strip(), key
+
+
+def spoken() -> dict[str, set[str]]:
+    """Key -> names of the values of every sentence that the toolkit says, out of its source; `key*` where the key's end is
+    made while running."""
+    found: dict[str, set[str]] = {}
+    for path in (Path(__file__).parents[1] / "toolkit").rglob("*.py"):
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name)):
+                continue
+            if call.func.id not in ("said", "Sentence") or path.name == "sentence.py":
+                continue
+            key = call.args[call.func.id == "Sentence"]
+            name = key.value if isinstance(key, ast.Constant) else f"{key.values[0].value}*"
+            found[f"said.{name}"] = {k.arg for k in call.keywords}
+    return found
+
+
+@pytest.mark.parametrize("lang", sorted(set(languages()) - {"en"}))
+def test_every_sentence_that_is_logged_can_be_said(lang):
+    """English stands where it is said; another language has words for each, with no other blanks."""
+    table, sentences = load_words(lang).table, spoken()
+    assert len(sentences) > 60
+    for key, values in sentences.items():
+        matching = [k for k in table if k.startswith(key[:-1])] if key.endswith("*") else [key]
+        assert all(k in table for k in matching), key
+        assert matching
+        assert all(blanks(table[k]) <= values for k in matching), key
+    beginnings = tuple(key[:-1] for key in sentences if key.endswith("*"))
+    others = {k for k in table if k.startswith("said.") and not k.startswith(("said.term.", "said.solver."))}
+    assert {k for k in others - set(sentences) if not k.startswith(beginnings)} == set()
 
 
 @pytest.mark.parametrize("lang", languages())

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from toolkit.fitting.cycles import Cycles
 
 PAPER = "small_angle_linear_drag"
+DRAGS = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
+"""The parameters that a drag model has, in the order they are told."""
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ def series_html(series: ThetaSeries) -> str:
 
 def fit_html(result: FitResult, lang: str = "en") -> str:
     """The model, its parameters with uncertainties, χ² and what to know."""
-    from toolkit.report.build import model_name
+    from toolkit.report.speech import model_name, say_whole, symbol
     from toolkit.report.words import load_words
 
     words = load_words(lang)
@@ -53,22 +53,24 @@ def fit_html(result: FitResult, lang: str = "en") -> str:
         return f"<div><b>{escape(model_name(words, result.model))}</b>: {escape(result.message)}</div>"
     rows = []
     for name, found in (*result.parameters.items(), *result.derived.items()):
-        symbol, meaning = words.either(f"symbol.{name}", name), words.either(f"meaning.{name}", name)
+        meaning = words.either(f"meaning.{name}", name)
         shown = with_uncertainty(found.value, found.stderr, found.unit)
-        rows.append(f"<tr><td>{marked(symbol)}</td><td>{marked(shown)}</td><td>{marked(meaning)}</td></tr>")
+        rows.append(
+            f"<tr><td>{marked(symbol(words, name))}</td><td>{marked(shown)}</td><td>{marked(meaning)}</td></tr>"
+        )
     tail = f"χ²/dof = {number(result.reduced_chi2, 3)}, {result.dof} dof, AIC {number(result.aic, 5)}"
-    notes = "".join(f"<li>{escape(w)}</li>" for w in result.warnings)
+    notes = "".join(f"<li>{escape(say_whole(words, w))}</li>" for w in result.warnings)
     title = escape(model_name(words, result.model))
     return f"<div><b>{title}</b><table>{''.join(rows)}</table>{marked(tail)}<ul>{notes}</ul></div>"
 
 
 def finding_html(finding: Finding, lang: str = "en") -> str:
     """The verdict, its sentence and the remedy."""
-    from toolkit.report.build import remedy, sentence
+    from toolkit.report.speech import assumption, remedy, sentence
     from toolkit.report.words import load_words
 
     words = load_words(lang)
-    title = words.either(f"assumption.{finding.assumption}", finding.assumption.replace("_", " "))
+    title = assumption(words, finding)
     tone = _TONES.get(finding.verdict, "#5b6270")
     label = f'<b style="color:{tone}">{escape(words(f"verdict.{finding.verdict}"))}</b>'
     return f"<div><b>{marked(title)}</b>: {label}. {marked(sentence(words, finding))} <i>{marked(remedy(words, finding))}</i></div>"
@@ -76,7 +78,7 @@ def finding_html(finding: Finding, lang: str = "en") -> str:
 
 def analysis_html(analysis: Analysis, lang: str = "en") -> str:
     """The report's first page without its pictures: the answers and the two verdicts."""
-    from toolkit.report.build import facts, lead
+    from toolkit.report.essentials import facts, lead
     from toolkit.report.material import Material
     from toolkit.report.words import load_words
 

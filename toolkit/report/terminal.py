@@ -13,8 +13,9 @@ if TYPE_CHECKING:
 
 def summary_lines(analysis: Analysis, lang: str = "en") -> list[str]:
     """What was measured, the answers, and the verdicts, one line each (long ones wrapped)."""
-    from toolkit.report.build import MAIN, facts, lead, remedy, sentence
+    from toolkit.report.essentials import MAIN, facts, lead
     from toolkit.report.material import Material
+    from toolkit.report.speech import assumption, remedy, sentence
     from toolkit.report.words import load_words
 
     words = load_words(lang)
@@ -25,7 +26,7 @@ def summary_lines(analysis: Analysis, lang: str = "en") -> list[str]:
         lines.append(f"{bare(fact.question)}  {bare(fact.answer)}{remark}")
     for finding in analysis.findings:
         if finding.assumption in MAIN:
-            title = words.either(f"assumption.{finding.assumption}", finding.assumption)
+            title = assumption(words, finding)
             text = f"{bare(title)}: {words(f'verdict.{finding.verdict}')}. {bare(sentence(words, finding))} {bare(remedy(words, finding))}"
             lines += textwrap.wrap(text, 110, subsequent_indent="  ")
     return lines

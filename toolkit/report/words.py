@@ -30,6 +30,10 @@ class Words:
         """The words for `key`, or `otherwise` where this language has none."""
         return self(key, **values) if key in self.table else otherwise
 
+    def under(self, prefix: str) -> tuple[tuple[str, str], ...]:
+        """(rest of the key, words) of every key that begins with `prefix`."""
+        return tuple((key.removeprefix(prefix), text) for key, text in self.table.items() if key.startswith(prefix))
+
     def date(self, day: date) -> str:
         """A calendar date as the language writes it (Thai: the year of the Buddhist era)."""
         year = day.year + int(self.table["date.year_offset"])

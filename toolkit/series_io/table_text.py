@@ -59,7 +59,7 @@ def parse_table(text: str, path: Path) -> Table:
     width = _width([cells for _, cells in rows[first : first + 60]])
     names = _header([cells for _, cells in rows[max(0, first - 2) : first]], comments, width, delimiter, path)
     data = rows[first:]
-    between = said(f"series.{_DELIMITERS[delimiter]}", _DELIMITERS[delimiter])
+    between = said(f"delimiter.{_DELIMITERS[delimiter]}", _DELIMITERS[delimiter])
     rows_read = "Read {count} rows from {file} ({delimiter} between columns)."
     log: list[str] = [said("series.rows", rows_read, count=len(data), file=path.name, delimiter=between)]
     columns, odd, commas = _numbers(data, width, comma, path)

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from toolkit.report.document import Figure
-from toolkit.report.material import Material
+from toolkit.report.material import DRAGS, Material
 from toolkit.report.numbers import bare
 from toolkit.report.style import BEST_MODEL, INK, draw, panels
-
-_DRAGS = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
 
 
 def contours(material: Material) -> Figure | None:
@@ -19,11 +17,11 @@ def contours(material: Material) -> Figure | None:
     fits = [r for r in material.analysis.fits.values() if r.success and _covariance(r) is not None and len(r.free) >= 2]
     if not fits:
         return None
-    result = max(fits, key=lambda r: (sum(n in _DRAGS for n in r.free), r is material.best))
+    result = max(fits, key=lambda r: (sum(n in DRAGS for n in r.free), r is material.best))
     if (
         result is not material.best
         and _covariance(material.best) is not None
-        and sum(n in _DRAGS for n in material.best.free) >= 2
+        and sum(n in DRAGS for n in material.best.free) >= 2
     ):
         result = material.best
     words = material.words
@@ -76,7 +74,7 @@ def _covariance(result: Any) -> np.ndarray | None:
 
 
 def _pair(names: tuple[str, ...], correlation: np.ndarray) -> tuple[int, int]:
-    drags = [i for i, name in enumerate(names) if name in _DRAGS]
+    drags = [i for i, name in enumerate(names) if name in DRAGS]
     if len(drags) >= 2:
         return drags[0], drags[1]
     off = np.abs(correlation - np.eye(len(names)))

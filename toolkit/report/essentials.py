@@ -1,0 +1,176 @@
+"""The first page: what was measured, the answers, the two verdicts with the picture that shows each."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.report.document import Fact, Figure, Verdict
+from toolkit.report.material import DRAGS, Material, parameter
+from toolkit.report.numbers import number, percent, with_uncertainty
+from toolkit.report.speech import assumption, model_name, remedy, say, sentence, symbol
+from toolkit.report.words import Words
+
+if TYPE_CHECKING:
+    from toolkit.checks.finding import Finding
+    from toolkit.fit import FitResult
+
+MAIN = ("small_angle", "linear_drag")
+
+
+def lead(material: Material) -> str:
+    """One sentence on what was measured."""
+    words, series, cycles = material.words, material.analysis.series, material.cycles
+    widest = float(np.max(np.abs(material.theta - material.offset)))
+    common = {"points": len(series), "duration": number(series.duration_s, 3)}
+    if cycles is None:
+        text = words("page.lead_few", first=number(math.degrees(widest), 3), **common)
+    else:
+        ends = cycles.amplitude_rad[0], cycles.amplitude_rad[-1]
+        first, last = (number(math.degrees(a), 3) for a in ends)
+        swings = round(series.duration_s / float(np.median(cycles.period_s)))
+        text = words("page.lead", swings=swings, first=first, last=last, **common)
+    recorded = series.meta.get("recorded_on")
+    return f"{text} {words('page.recorded', date=words.date(recorded))}" if recorded else text
+
+
+def facts(material: Material) -> tuple[Fact, ...]:
+    """The five answers that a student looks for, and the numbers beside them."""
+    words, best, scene = material.words, material.best, material.analysis.scene
+    if not best.success:
+        return (Fact(words("question.drag"), words("answer.failed"), say(words, best.message)),)
+    remark = words("answer.model", model=model_name(words, best.model))
+    if "alpha_d" in best.parameters:
+        remark += f"; {words('answer.no_mass')}"
+    found = [Fact(words("question.drag"), drag_answer(material, best), remark)]
+    found.append(Fact(words("question.sure"), _sure(material, best), _inflation(words, best)))
+    paper = material.paper
+    if paper is not None and paper is not best and paper.success:
+        wrong = any(f.verdict == "fails" for f in material.analysis.findings if f.assumption in MAIN)
+        remark = words("answer.paper_wrong" if wrong else "answer.paper_off")
+        found.append(Fact(words("question.drag_paper"), drag_answer(material, paper), remark))
+    for name in MAIN:
+        finding = _finding(material, name)
+        if finding is not None:
+            found.append(Fact(words(f"question.{name}"), _short_answer(material, finding), _theory(words, finding)))
+    period = parameter(material.full_sine, "T0")
+    if period is not None:
+        shown = with_uncertainty(period.value, period.stderr, "s")
+        found.append(
+            Fact(words("question.period"), f"{symbol(words, 'T0')} = {shown}", _mean_period(material, period.value))
+        )
+    g = scene.environment.gravity_m_per_s2
+    for name in ("length", "equivalent_length"):
+        length = parameter(material.full_sine, name)
+        if length is not None:
+            given = name == "length" and length.fixed
+            remark = words("answer.given_length") if given else words("answer.equivalent", g=number(g, 6))
+            found.append(Fact(words("question.length"), with_uncertainty(length.value, length.stderr, "m"), remark))
+            break
+    gravity = parameter(material.full_sine, "g_from_length")
+    if gravity is not None:
+        found.append(Fact(words("question.g"), f"g = {with_uncertainty(gravity.value, gravity.stderr, 'm/s²')}"))
+    return tuple(found)
+
+
+def _mean_period(material: Material, small_s: float) -> str:
+    """What a stopwatch would give: the median of the measured periods, with the amplitude it belongs to."""
+    if material.cycles is None:
+        return ""
+    angle = math.degrees(float(np.median(material.cycles.amplitude_rad)))
+    longer = float(np.median(material.cycles.period_s))
+    share = percent(longer / small_s - 1)
+    return material.words("answer.mean_period", angle=number(angle, 3), period=number(longer, 5), percent=share)
+
+
+def drag_answer(material: Material, result: FitResult) -> str:
+    """The drag coefficients of a model with their uncertainties, `;` between them."""
+    words, parts = material.words, []
+    for name in DRAGS:
+        found = result.parameters.get(name)
+        if found is None:
+            continue
+        if found.stderr and found.value < found.stderr:
+            bound = number(max(found.value, 0) + 1.645 * found.stderr, 2)
+            unit = with_uncertainty(1.0, None, found.unit)[1:].strip()
+            parts.append(words("answer.zero_drag", symbol=symbol(words, name), bound=f"{bound} {unit}".strip()))
+        else:
+            parts.append(f"{symbol(words, name)} = {with_uncertainty(found.value, found.stderr, found.unit)}")
+    return "; ".join(parts) or "–"
+
+
+def _sure(material: Material, result: FitResult) -> str:
+    words, parts = material.words, []
+    for name in DRAGS:
+        found = result.parameters.get(name)
+        if found is not None and found.stderr and found.value > found.stderr:
+            parts.append(words("answer.sure", symbol=symbol(words, name), percent=percent(found.stderr / found.value)))
+    return ", ".join(parts) or "–"
+
+
+def _inflation(words: Words, result: FitResult) -> str:
+    factor = float(result.noise.get("inflation", 1.0) or 1.0)
+    meaning = words("answer.sure_meaning")
+    return f"{meaning}; {words('answer.inflated', factor=number(factor, 2))}" if factor > 1.15 else meaning
+
+
+def _short_answer(material: Material, finding: Finding) -> str:
+    """Yes, no or cannot tell, with the angle that divides."""
+    words, where, evidence = material.words, finding.where, finding.evidence
+    if finding.verdict == "not_distinguishable":
+        return words("answer.unclear")
+    if finding.assumption == "small_angle":
+        widest = evidence.get("amplitude_max_rad")
+        if finding.verdict == "fails" and "amplitude_above_rad" in where:
+            angle = number(math.degrees(where["amplitude_above_rad"]), 2)
+            return words("answer.no_to", angle=angle, widest=number(math.degrees(widest), 3) if widest else "–")
+        if finding.verdict == "holds" and widest:
+            return words("answer.yes_to", angle=number(math.degrees(widest), 2))
+    widest = float(np.max(np.abs(material.theta - material.offset)))
+    if finding.verdict == "fails" and where.get("amplitude_below_rad", 0.0) >= 0.9 * widest:
+        return words("answer.throughout")
+    if finding.verdict == "fails" and "amplitude_above_rad" in where:
+        return words("answer.above", angle=number(math.degrees(where["amplitude_above_rad"]), 2))
+    if finding.verdict == "fails" and "amplitude_below_rad" in where:
+        return words("answer.below", angle=number(math.degrees(where["amplitude_below_rad"]), 2))
+    return words("answer.yes" if finding.verdict == "holds" else "answer.no")
+
+
+def _theory(words: Words, finding: Finding) -> str:
+    """What theory alone says of the small-angle period at this swing's width; "" for other assumptions."""
+    shift, widest = finding.evidence.get("period_shift_relative"), finding.evidence.get("amplitude_max_rad")
+    if finding.assumption != "small_angle" or shift is None or widest is None:
+        return ""
+    return words("answer.theory", percent=percent(shift), angle=number(math.degrees(widest), 3))
+
+
+def verdicts(material: Material) -> tuple[Verdict, ...]:
+    """The two verdicts, each with the picture that shows it."""
+    from toolkit.report.figures.decay import decay
+    from toolkit.report.figures.period import period
+
+    pictures = {"small_angle": period, "linear_drag": decay}
+    cards = []
+    for name in MAIN:
+        finding = _finding(material, name)
+        if finding is not None:
+            cards.append(card(material.words, finding, pictures[name](material)))
+    return tuple(cards)
+
+
+def card(words: Words, finding: Finding, figure: Figure | None) -> Verdict:
+    return Verdict(
+        finding.assumption,
+        finding.verdict,
+        assumption(words, finding),
+        words(f"verdict.{finding.verdict}"),
+        sentence(words, finding),
+        remedy(words, finding),
+        figure,
+    )
+
+
+def _finding(material: Material, assumption: str) -> Finding | None:
+    return next((f for f in material.analysis.findings if f.assumption == assumption), None)
