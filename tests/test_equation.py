@@ -98,7 +98,7 @@ def test_closed_form_sensitivities_equal_integrated_ones():
     exact = equation.solve(p, 0.3, 0.2, t, 1e-12, names)
     assert "closed form" in exact.method
     values = tuple(p[n] for n in equation.parameters)
-    series = equation._integrate(values, 0.3, 0.2, t, 1e-12, names, 0.0)
+    series = equation.prepare(t, 1e-12, names).integrate(values, 0.3, 0.2)
     np.testing.assert_allclose(exact.theta_rad, series.theta_rad, atol=1e-12)
     size = 1 + np.abs(series.d_theta).max(axis=0)
     np.testing.assert_allclose(exact.d_theta / size, series.d_theta / size, atol=1e-9)
@@ -166,7 +166,7 @@ def test_a_cache_that_cannot_be_written_is_replaced_by_a_temporary_one(tmp_path)
 
 
 def test_dop853_table_obeys_the_order_conditions():
-    from toolkit.motion.dop853_table import NODES, A
+    from toolkit.motion.kernels.dop853_table import NODES, A
 
     weights, nodes, matrix = A[12, :12], NODES[:12], A[:12, :12]
     for power in range(8):

@@ -283,7 +283,7 @@ def test_a_hundred_thousand_periods():
     equation = build_equation()
     times = np.array([1e5 * period])
     exact = equation.solve(UNIT, 1.0, 0.0, times)
-    series = equation._integrate((1.0, 1.0), 1.0, 0.0, times, 1e-9, (), 0.0)
+    series = equation.prepare(times, 1e-9).integrate((1.0, 1.0), 1.0, 0.0)
     assert "Taylor" in series.method
     for solved in (exact, series):
         phase = solved.omega_rad_per_s[0] / math.sin(1.0) * 2 * np.pi / period  # rad of 2π a period

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from toolkit.errors import UsageError
-from toolkit.motion.equation import Equation, Solution, build_equation
+from toolkit.motion.equation import Equation, build_equation
+from toolkit.motion.solver import Solution
 from toolkit.scene import Scene
 from toolkit.trajectory import SolveCost, Trajectory
 
@@ -88,6 +89,7 @@ def _simulate_slack(
     scene: Scene, equation: Equation, parameters: Mapping[str, float], t: np.ndarray, accuracy_rad: float
 ) -> Trajectory:
     """The string goes slack where T < 0; taut again, the bob has lost its velocity along the string."""
+    from toolkit.motion.flight import free_flight
     from toolkit.motion.slack import solve_with_slack
 
     if scene.pendulum.mass_kg is None:
@@ -104,7 +106,7 @@ def _simulate_slack(
     def tension(times: np.ndarray, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
         return np.asarray(equation.terms_at(parameters, times, theta, omega).tension)
 
-    flight = equation.flight(parameters)
+    flight = free_flight(equation, parameters)
     solution = solve_with_slack(
         t, scene.release.theta0_rad, scene.release.omega0_rad_per_s, parameters["length_m"], flight.g_m_per_s2,
         swing, tension, flight.acceleration, equation.fastest_rad_per_s(parameters),

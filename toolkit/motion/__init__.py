@@ -1,5 +1,6 @@
 """From the active effects to one equation, and from the equation to its solution."""
 
-from toolkit.motion.equation import Equation, Solution, build_equation
+from toolkit.motion.equation import Equation, build_equation
+from toolkit.motion.solver import Solution, Solver
 
-__all__ = ["Equation", "Solution", "build_equation"]
+__all__ = ["Equation", "Solution", "Solver", "build_equation"]

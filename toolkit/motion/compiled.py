@@ -15,6 +15,9 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
+
+from toolkit.errors import JobError
 
 
 def _tell_terminal(message: str) -> None:
@@ -55,11 +58,15 @@ def key_of(*parts: object) -> str:
 def place(name: str, source: str) -> Path:
     """Write a generated module whole into the cache folder."""
     path = cache_folder() / f"{name}.py"
-    handle, scratch = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(source)
-    os.replace(scratch, path)
+    _write(path, source.encode())
     return path
+
+
+def _write(path: Path, content: bytes) -> None:
+    handle, scratch = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    with os.fdopen(handle, "wb") as file:
+        file.write(content)
+    os.replace(scratch, path)
 
 
 def load(name: str) -> ModuleType | None:
@@ -71,7 +78,6 @@ def load(name: str) -> ModuleType | None:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # Numba's cache looks it up by name
     try:
         spec.loader.exec_module(module)
     except (SyntaxError, OSError):
@@ -79,40 +85,129 @@ def load(name: str) -> ModuleType | None:
     return module
 
 
-def jet_address(module: ModuleType) -> int:
-    """The address of the module's jet(q, s, W, R, n) as machine code, compiled now or found on disk."""
-    from numba import types
+@cache
+def series(module: ModuleType, name: str) -> int:
+    """The address of the module's `jet` or `more`, (q, s, W, R, n), as machine code."""
 
-    from toolkit.motion.pointer import REALS
+    def source() -> tuple[list[Any], Any, Any]:
+        from numba import types
 
-    return _address(module, "jet", [REALS] * 4 + [types.int64], {"contract", "reassoc", "nsz"})
+        from toolkit.motion.kernels.pointer import REALS
 
+        return [REALS] * 4 + [types.int64], {"contract", "reassoc", "nsz"}, getattr(module, name)
 
-def terms_address(module: ModuleType) -> int:
-    """The address of the module's terms(q, s, out) as machine code, compiled now or found on disk."""
-    from toolkit.motion.pointer import REALS
-
-    return _address(module, "terms", [REALS] * 3)
+    return machine_code(f"{module.__name__}_{name}", source)
 
 
 @cache
-def integrator(module: ModuleType) -> Callable[..., None]:
-    """integrate() of taylor, dop853 or rodas as machine code: a C function of eleven addresses after the equation's."""
+def terms(module: ModuleType) -> int:
+    """The address of the module's terms(q, s, out) as machine code."""
+
+    def source() -> tuple[list[Any], Any, Any]:
+        from toolkit.motion.kernels.pointer import REALS
+
+        return [REALS] * 3, False, module.terms
+
+    return machine_code(f"{module.__name__}_terms", source)
+
+
+@cache
+def kernel(name: str) -> Callable[[int, None, int], int]:
+    """The function NAME of kernels/NAME.py as machine code: (scratch address, None, address of its places) -> 0."""
     import ctypes
 
-    from numba import types
+    def source() -> tuple[list[Any], Any, Any]:
+        import importlib
 
-    from toolkit.motion.pointer import REALS, WHOLES
+        from toolkit.motion.kernels.pointer import WHOLES
 
-    address = _address(module, "integrate", [types.int64, REALS, *[WHOLES] * 3, *[REALS] * 7])
-    return ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 11)(address)
+        return [WHOLES], False, getattr(importlib.import_module(f"toolkit.motion.kernels.{name}"), name)
+
+    folder = Path(__file__).parent
+    texts = [file.read_bytes() for file in (folder / "routes.py", *sorted((folder / "kernels").glob("*.py")))]
+    address = machine_code(f"{name}_{key_of(*texts)}", source)
+    return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
 
 
-def _address(module: ModuleType, name: str, kinds: list[object], fastmath: object = False) -> int:
-    import numba
+def machine_code(name: str, source: Callable[[], tuple[list[Any], Any, Any]]) -> int:
+    """The address of a function that Numba compiles now, or that was compiled before for a processor like this one.
 
-    signature = numba.void(*kinds)
-    made = numba.cfunc(signature, cache=True, error_model="numpy", fastmath=fastmath)(getattr(module, name))
-    module.__dict__[f"compiled_{name}"] = made  # the machine code lives as long as the module
-    address: int = made.address
+    source : gives its argument types, fastmath flags and Python function; called only where nothing is on the disk. A
+    process that finds everything compiled imports llvmlite alone, in a tenth of the time that Numba takes.
+    The function is called as Numba calls its own: first an address for its (empty) result and one for an exception.
+    """
+    processor = _processor()
+    path = cache_folder() / f"{name}_{processor.key}.o"
+    address = processor.load(path, name)
+    if address is None:
+        listener("compiling the equation of motion (once; later runs find it ready)")
+        import numba
+
+        kinds, fastmath, function = source()
+        made = numba.cfunc(numba.void(*kinds), error_model="numpy", fastmath=fastmath)(function)
+        _write(path, processor.emit(made.inspect_llvm(), made.native_name.removeprefix("cfunc."), name))
+        address = processor.load(path, name)
+    if address is None:
+        raise JobError(f"cannot keep compiled equations in {cache_folder()}; set PENDULAB_CACHE to a folder")
     return address
+
+
+_C_MATH = ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pow", "memcpy", "memmove", "memset")
+
+
+class _Processor:
+    """This processor as LLVM knows it, and the code that was loaded for it."""
+
+    def __init__(self) -> None:
+        import llvmlite  # type: ignore[import-untyped]
+        import llvmlite.binding as llvm  # type: ignore[import-untyped]
+
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        if os.name == "nt":  # elsewhere LLVM finds these in the process itself
+            import ctypes
+
+            for name in _C_MATH:
+                llvm.add_symbol(name, ctypes.cast(getattr(ctypes.cdll.ucrtbase, name), ctypes.c_void_p).value)
+        self.llvm = llvm
+        triple, cpu = llvm.get_process_triple(), llvm.get_host_cpu_name()
+        features = llvm.get_host_cpu_features().flatten()
+        self.key = key_of(llvmlite.__version__, triple, cpu, features)
+        x86 = triple.split("-")[0] in ("x86_64", "amd64", "i386", "i686")
+        self.machine = llvm.Target.from_triple(triple).create_target_machine(
+            cpu=cpu, features=features, opt=3, reloc="static" if x86 else "default", codemodel="jitdefault", jit=True
+        )
+        self.engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), self.machine)
+
+    def load(self, path: Path, name: str) -> int | None:
+        try:
+            code = path.read_bytes()
+            self.engine.add_object_file(self.llvm.ObjectFileRef.from_data(code))
+        except (OSError, RuntimeError):  # not there, or cut short
+            return None
+        self.engine.finalize_object()
+        address: int = self.engine.get_function_address(name)
+        return address or None
+
+    def emit(self, text: str, function: str, name: str) -> bytes:
+        """Machine code, under `name`, of one function of an LLVM module and of what that calls."""
+        module = self.llvm.parse_assembly(text)
+        for value in (*module.functions, *module.global_variables):
+            if not value.is_declaration:
+                value.linkage = "internal"
+        kept = module.get_function(function)
+        kept.linkage, kept.name = "external", name
+        passes = self.llvm.create_new_module_pass_manager()
+        passes.add_global_dead_code_eliminate_pass()
+        passes.run(module, self.llvm.create_pass_builder(self.machine, self.llvm.create_pipeline_tuning_options()))
+        called = [f.name for f in module.functions if f.is_declaration]
+        unknown = [f for f in called if not f.startswith("llvm.") and f not in _C_MATH]
+        if unknown:
+            raise JobError(f"{name} calls {', '.join(unknown)}, which a later process would not find; report this")
+        code: bytes = self.machine.emit_object(module)
+        return code
+
+
+@cache
+def _processor() -> _Processor:
+    return _Processor()

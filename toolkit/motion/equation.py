@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from operator import itemgetter
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -17,6 +19,7 @@ from toolkit.effects.effect import Effect, Term
 from toolkit.effects.formula import formula_needs, formula_parameters
 from toolkit.errors import JobError, UsageError
 from toolkit.motion.blocks import blocks
+from toolkit.motion.solver import START, Solution, Solver
 from toolkit.motion.symbols import (
     SCENE_SYMBOLS,
     Latex,
@@ -27,29 +30,8 @@ from toolkit.motion.symbols import (
     sympy_functions,
 )
 from toolkit.registry import did_you_mean
-from toolkit.trajectory import Event, SolveCost
 
-START = ("theta0_rad", "omega0_rad_per_s")
-_VERSION = 5  # of the generated code: a change here makes old caches unused
-
-
-@dataclass(frozen=True)
-class Solution:
-    """θ and θ' at the times asked for; d_theta and d_omega (n, k) are their derivatives by the k sensitivities.
-
-    `error_estimate_rad` is the estimated largest error of θ over the whole run, all steps' errors carried along.
-    """
-
-    t_s: np.ndarray
-    theta_rad: np.ndarray
-    omega_rad_per_s: np.ndarray
-    d_theta: np.ndarray
-    d_omega: np.ndarray
-    method: str
-    cost: SolveCost
-    error_estimate_rad: float
-    events: tuple[Event, ...] = ()
-    warnings: tuple[str, ...] = ()
+_recent = threading.local()  # each thread's last solver: fits ask for the same times again and again
 
 
 @dataclass(frozen=True)
@@ -111,7 +93,7 @@ class Equation:
 
     def terms_at(self, parameters: Mapping[str, float], t_s: Any, theta_rad: Any, omega_rad_per_s: Any) -> Motion:
         """Torque, inertia, tension and energy at states, as numbers or arrays. Raises UsageError for a missing parameter."""
-        values = dict(zip(self.parameters, self._values(parameters)))
+        values = dict(zip(self.parameters, self.values(parameters)))
         values.setdefault("mass_kg", parameters.get("mass_kg", 1.0))
         state = {"t": t_s, "theta": theta_rad, "omega": omega_rad_per_s}
         return self._motion(
@@ -122,7 +104,7 @@ class Equation:
         self, parameters: Mapping[str, float], t_s: np.ndarray, theta_rad: np.ndarray, omega_rad_per_s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tension (N) and energy (J) along a motion: as `terms_at`, without evaluating what does not enter them."""
-        values = dict(zip(self.parameters, self._values(parameters)))
+        values = dict(zip(self.parameters, self.values(parameters)))
         values["mass_kg"] = mass = parameters["mass_kg"]
         length, g = values["length_m"], values["g_m_per_s2"]
         tension, energy = np.empty(t_s.size), np.empty(t_s.size)
@@ -141,7 +123,7 @@ class Equation:
         return tension, energy
 
     @cached_property
-    def _sampled(self) -> list[tuple[Effect, Term]]:
+    def sampled_terms(self) -> list[tuple[Effect, Term]]:
         """The effects (but `formula`, a torque and nothing else) with their terms for a motion of ones."""
         values = dict.fromkeys((*self.parameters, "mass_kg"), 1.0)
         state = {"t": 0.1, "theta": 0.2, "omega": 0.3}
@@ -152,7 +134,9 @@ class Equation:
     def _observed(self) -> tuple[Effect, ...]:
         """The effects that enter tension or energy."""
         nothing = Term()
-        return tuple(e for e, t in self._sampled if (t.inertia, t.radial_force, t.energy) != (nothing.inertia, 0, 0))
+        return tuple(
+            e for e, t in self.sampled_terms if (t.inertia, t.radial_force, t.energy) != (nothing.inertia, 0, 0)
+        )
 
     def _motion(self, seen: dict[str, Symbols]) -> Motion:
         s = seen[""]
@@ -165,37 +149,6 @@ class Equation:
         for term in terms:
             tension, energy = tension + term.radial_force, energy + term.energy
         return Motion(torque, inertia, tension, energy)
-
-    def flight(self, parameters: Mapping[str, float]) -> Flight:
-        """What moves the bob while the string is slack: gravity less buoyancy, drag, and the shaking of the frame."""
-        values = dict(zip(self.parameters, self._values(parameters)))
-        mass, g, length = (values[n] for n in ("mass_kg", "g_m_per_s2", "length_m"))
-        drags = [effect for effect, term in self._sampled if not isinstance(term.drag, int)]
-        names = {e.name for e in self.effects}
-        moving = [e for e in self.effects if e.pivot is not None]
-        displaced = carried = 0.0
-        if names & {"buoyancy", "added_mass"}:
-            displaced = 4 / 3 * math.pi * values["bob_radius_m"] ** 3 * values["fluid_density_kg_per_m3"]
-        functions = number_functions()
-        state = {"t": 0.0, "theta": 0.0, "omega": 0.0}
-        if "added_mass" in names:
-            at_rest = symbols(functions, state, values, self.effects, False, self.formula_text)
-            carried = float(load_effect("added_mass").term(at_rest["added_mass"]).inertia) / length**2
-        inertia = mass + carried
-        weight = (mass - (displaced if "buoyancy" in names else 0.0)) / inertia
-        if not drags and not moving:
-            return Flight(g * weight, None)
-
-        def acceleration(t: float, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-            seen = symbols(functions, {**state, "t": t}, values, self.effects, False, self.formula_text)
-            pivot = seen[""].pivot
-            against = velocity + np.array(pivot.velocity) if pivot is not None else velocity
-            speed = float(np.hypot(*against))
-            drag = sum(float(e.term(seen[e.name].of({"speed": speed, "velocity": speed})).drag) for e in drags)
-            total = np.array([0.0, -g * weight]) - drag / inertia * against
-            return total - np.array(pivot.acceleration) if pivot is not None else total
-
-        return Flight(g * weight, acceleration)
 
     def fastest_rad_per_s(self, parameters: Mapping[str, float]) -> float:
         """The highest angular frequency with which time itself enters the equation, 0 where it does not."""
@@ -211,14 +164,19 @@ class Equation:
             torque, inertia = torque + term.torque - term.drag * (s.length_m * s.velocity), inertia + term.inertia
         return torque, inertia, terms, [term.harmonic for term in terms if term.harmonic is not None]
 
-    def _values(self, parameters: Mapping[str, float]) -> tuple[float, ...]:
+    def values(self, parameters: Mapping[str, float]) -> tuple[float, ...]:
+        """The values of `parameters`, in order. Raises UsageError for one that is missing."""
         try:
-            return tuple([float(parameters[name]) for name in self.parameters])
+            return self._take(parameters)
         except KeyError as error:
             name = error.args[0]
             raise UsageError(
                 f"the equation needs {name}; give it a value{did_you_mean(name, list(parameters))}"
             ) from None
+
+    @cached_property
+    def _take(self) -> Callable[[Mapping[str, float]], tuple[float, ...]]:
+        return itemgetter(*self.parameters)  # at least two: length and gravity
 
     # -- the generated module ------------------------------------------------------------------------------------
 
@@ -232,9 +190,9 @@ class Equation:
 
             return effect.name, inspect.getsource(inspect.getmodule(effect.term))  # type: ignore[arg-type]
 
-        name = "equation_" + compiled.key_of(
-            _VERSION, [fingerprint(e) for e in self.effects], self.small_angle, self.formula_text
-        )
+        writers = [(Path(__file__).parent / f"{n}.py").read_bytes() for n in ("equation", "symbols", "generate", "jet")]
+        effects = [fingerprint(effect) for effect in self.effects]
+        name = "equation_" + compiled.key_of(writers, effects, self.small_angle, self.formula_text)
         module = compiled.load(name)
         if module is None:
             compiled.listener("compiling the equation of motion (once; later runs find it ready)")
@@ -249,8 +207,6 @@ class Equation:
     @property
     def source(self) -> str:
         """The generated source code."""
-        from pathlib import Path
-
         return Path(str(self.code.__file__)).read_text(encoding="utf-8")
 
     def _derive(self) -> str:
@@ -275,15 +231,13 @@ class Equation:
         names = {"theta": theta, "w": w, "tau": tau, "scale": scale, "parameters": known}
         return write_source(self.parameters, motion.torque, motion.inertia, names, self.latex)
 
-    @cached_property
-    def _jet(self) -> tuple[int, float]:
-        from toolkit.motion import compiled
-
-        began = time.process_time()
-        address = compiled.jet_address(self.code)
-        return address, time.process_time() - began
-
     # -- solving -------------------------------------------------------------------------------------------------
+
+    def prepare(
+        self, t_s: Any, accuracy_rad: float = 1e-9, sensitivities: Sequence[str] = (), start_s: float = 0.0
+    ) -> Solver:
+        """A solver for these times, accuracy and sensitivities (see `solve`), to be called with many parameters and starts."""
+        return Solver(self, t_s, accuracy_rad, sensitivities, start_s)
 
     def solve(
         self,
@@ -302,23 +256,24 @@ class Equation:
         Raises UsageError for a missing parameter or an unknown sensitivity, JobError where the motion leaves all bounds.
         """
         t = np.ascontiguousarray(t_s, dtype=float)
-        if t.ndim != 1 or (t.size and not (t[0] >= start_s and t[-1] < math.inf and (t[1:] >= t[:-1]).all())):
-            raise UsageError(f"times must be one increasing column from {start_s:g} s on; sort them")
-        if not accuracy_rad > 0:
-            raise UsageError(f"accuracy_rad must be positive, got {accuracy_rad}")
-        p = self._values(parameters)
-        names = tuple(sensitivities)
-        if t.size == 0:
-            return Solution(
-                t, t, t, np.empty((0, len(names))), np.empty((0, len(names))), "nothing to do", SolveCost(), 0.0
-            )
-        exact = self._solve_exactly(p, theta0_rad, omega0_rad_per_s, t, accuracy_rad, names, start_s)
-        if exact is not None:
-            return exact
-        return self._integrate(p, theta0_rad, omega0_rad_per_s, t, accuracy_rad, names, start_s)
+        asked = (self, accuracy_rad, tuple(sensitivities), start_s)
+        known = getattr(_recent, "solver", None)
+        if known is None or _recent.asked != asked or not np.array_equal(t, known.t_s):
+            # t is copied: whoever called may change it
+            known = _recent.solver = Solver(self, t.copy(), accuracy_rad, asked[2], start_s, learns=False)
+            _recent.asked = asked
+        return known.solve(parameters, theta0_rad, omega0_rad_per_s)
 
-    def _layout(self, sensitivities: tuple[str, ...]) -> tuple[Any, ...]:
-        """Where the rows of the coefficient matrix lie for these sensitivities; made once."""
+    def index_of(self, name: str) -> int | None:
+        """The place of a parameter, None for one that cancels from this equation. Raises UsageError for an unknown one."""
+        if name in self.parameters:
+            return self.parameters.index(name)
+        if name in SCENE_SYMBOLS:
+            return None
+        raise UsageError(f"no parameter {name!r} in this equation{did_you_mean(name, [*self.parameters, *START])}")
+
+    def layout(self, sensitivities: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, list[int]]:
+        """Where the rows of the coefficient matrix start, the column of each entry, and which partials it takes; made once."""
         known = self._memory.get(sensitivities)
         if known is not None:
             return known
@@ -327,27 +282,18 @@ class Equation:
         take: list[int] = []
         offsets = np.concatenate([[0], np.cumsum([len(row) for row in code.PARTIAL_ROWS])])
         for name in sensitivities:
-            if name in START:
-                rows.append([])
-            elif name in self.parameters:
-                i = self.parameters.index(name)
-                rows.append(list(code.PARTIAL_ROWS[i]))
+            i = None if name in START else self.index_of(name)
+            rows.append([] if i is None else list(code.PARTIAL_ROWS[i]))
+            if i is not None:
                 take += range(offsets[i], offsets[i + 1])
-            elif name in SCENE_SYMBOLS:
-                rows.append([])  # it cancels from this equation
-            else:
-                raise UsageError(
-                    f"no parameter {name!r} in this equation{did_you_mean(name, [*self.parameters, *START])}"
-                )
         rows.append([])  # of the error, which nothing forces
         for row in rows:
             start.append(start[-1] + len(row))
         columns = np.array([len(rows[0]), *[c for row in rows for c in row]], dtype=np.int64)
-        made = (np.array(start, dtype=np.int64), columns, take)
-        self._memory[sensitivities] = made
+        made = self._memory[sensitivities] = (np.array(start, dtype=np.int64), columns, take)
         return made
 
-    def _reduced(self, p: Sequence[complex]) -> tuple[complex, ...]:
+    def reduced(self, p: Sequence[complex]) -> tuple[complex, ...]:
         """(restoring, damping, drive, f, phase) of  θ'' = −restoring·sin θ − damping·θ' + drive·cos(2πft + phase).
 
         Only for effects declared linear; p may be complex (for derivatives).
@@ -368,209 +314,13 @@ class Equation:
             return restoring, damping, 0.0, 0.0, 0.0
         return restoring, damping, harmonics[0].amplitude / inertia, harmonics[0].f_hz, harmonics[0].phase_rad
 
-    def _solve_exactly(
-        self, p: tuple[float, ...], theta0: float, omega0: float, t: np.ndarray, accuracy: float,
-        sensitivities: tuple[str, ...], start_s: float,
-    ) -> Solution | None:  # fmt: skip
-        """The closed form of the linear equation, or the elliptic solution of the bare pendulum; None where neither fits."""
-        if not self._may_be_exact:
-            return None
-        began = time.process_time()
-        restoring, damping, drive, f_hz, phase = (float(v.real) for v in self._reduced(p))
-        if not restoring > 0:
-            return None
-        rate = math.sqrt(restoring)
-        if not self.small_angle:
-            if damping != 0 or drive != 0 or sensitivities:
-                return None
-            from toolkit.motion.elliptic import solve_pendulum
-
-            exact = solve_pendulum(t - start_s, theta0, omega0, rate)
-            none = np.empty((t.size, 0))
-            cost = SolveCost(time.process_time() - began)
-            error = 4e-16 * (abs(theta0) + math.pi + abs(float(exact.theta_rad[-1])))
-            return Solution(
-                t, exact.theta_rad, exact.omega_rad_per_s, none, none, "exact: elliptic functions", cost, error
-            )
-        from toolkit.motion.closed_form import solve_linear
-
-        turn = 2 * math.pi * f_hz
-        inputs = ("alpha_per_s", "omega_g_rad_per_s", "drive_rad_per_s2", "omega_f_rad_per_s", "phase_rad")
-        wanted = (*START, *inputs) if sensitivities else ()
-        solved = solve_linear(
-            t - start_s, theta0, omega0, damping / 2, rate, drive, turn, phase + turn * start_s, derivatives=wanted
-        )
-        chain = np.zeros((len(wanted), len(sensitivities)))
-        for column, name in enumerate(sensitivities):
-            if name in START:
-                chain[START.index(name), column] = 1.0
-            elif name in self.parameters:
-                step = 1e-30  # complex step: the derivative to the last digit
-                moved = [v + 1j * step if n == name else v for n, v in zip(self.parameters, p)]
-                k, d, a, f, ph = (complex(v).imag / step for v in self._reduced(moved))
-                by_turn = 2 * math.pi * f
-                chain[2:, column] = d / 2, k / (2 * rate), a, by_turn, ph + by_turn * start_s
-            elif name not in SCENE_SYMBOLS:
-                raise UsageError(
-                    f"no parameter {name!r} in this equation{did_you_mean(name, [*self.parameters, *START])}"
-                )
-        cost = SolveCost(time.process_time() - began)
-        error = 1e-15 * (1 + float(np.abs(solved.theta_rad).max()))
-        shape = (t.size, len(sensitivities))
-        by_theta = solved.d_theta @ chain if sensitivities else np.empty(shape)
-        by_omega = solved.d_omega @ chain if sensitivities else np.empty(shape)
-        method = "exact: closed form of the linear equation"
-        return Solution(t, solved.theta_rad, solved.omega_rad_per_s, by_theta, by_omega, method, cost, error)
-
     @cached_property
-    def _may_be_exact(self) -> bool:
+    def may_be_exact(self) -> bool:
+        """Linear, or bare but for effects that change inertia and weight alone: see `exact`."""
         kinds = [e for e in self.effects if e.name != "slack_string"]
         if self.is_linear:
             return True
         return not self.small_angle and all(e.linear and e.name not in ("linear_drag", "cosine_drive") for e in kinds)
-
-    @cached_property
-    def _terms(self) -> tuple[int, float]:
-        from toolkit.motion import compiled
-
-        began = time.process_time()
-        address = compiled.terms_address(self.code)
-        return address, time.process_time() - began
-
-    def _integrate(
-        self, p: tuple[float, ...], theta0: float, omega0: float, t: np.ndarray, accuracy: float,
-        sensitivities: tuple[str, ...], start_s: float,
-    ) -> Solution:  # fmt: skip
-        code = self.code
-        scale = 2.0 ** round(0.5 * math.log2(p[0] / p[1]))  # p: length_m, g_m_per_s2, …
-        layout, columns, take = self._layout(sensitivities)
-        coefficients = code.coefficients(p, scale)
-        entries = coefficients[code.N_INNER :]
-        if take:
-            partials = code.partials(p, scale)
-            entries += tuple([partials[i] for i in take])
-        k = len(sensitivities)
-        numbers = [code.fastest_rate(p, scale), float(theta0), float(omega0) * scale, start_s / scale, 0.0]
-        for name in sensitivities:
-            numbers += [float(name == START[0]), scale if name == START[1] else 0.0]
-        task = _Task(
-            np.array(coefficients or (0.0,)), layout, columns, np.array(entries or (0.0,)), np.array(numbers),
-            t if scale == 1.0 else t / scale, np.empty((2 + 2 * k, t.size)),
-        )  # fmt: skip
-        result = None
-        if not k and self._is_stiff(task, coefficients):
-            from toolkit.motion import rodas
-
-            result = self._run(rodas, task, accuracy)
-            result = None if result is None or result.error > accuracy else result
-        if result is None and code.ANALYTIC:
-            from toolkit.motion import taylor
-
-            result = self._run(taylor, task, accuracy)
-        if result is None:
-            from toolkit.motion import dop853
-
-            result = self._run(dop853, task, accuracy)
-        if result is None:
-            raise JobError("the motion grows without bound or meets a singularity; check the effects' parameters")
-        out = task.out
-        if scale != 1.0:
-            out[1] /= scale
-            out[3::2] /= scale
-        events = tuple(Event(("stick", "slip")[int(e[0])], float(e[1] * scale), float(e[2])) for e in result.events)
-        warnings: tuple[str, ...] = ()
-        if result.error > accuracy:
-            text = f"asked for {accuracy:.1e} rad, the estimated error is {result.error:.1e} rad: the motion amplifies rounding"
-            warnings = (text,)
-        return Solution(
-            t, out[0], out[1], out[2::2].T, out[3::2].T, result.method, result.cost,
-            result.error, events, warnings,
-        )  # fmt: skip
-
-    def _run(self, route: ModuleType, task: _Task, accuracy: float) -> _Result | None:
-        """By one route; None where that cannot hold the accuracy, or where a term has no series."""
-        from toolkit.motion import compiled, taylor
-
-        code, is_taylor = self.code, route is taylor
-        address, compile_s = self._jet if is_taylor else self._terms
-        began = time.process_time()
-        integrate = compiled.integrator(route)
-        compile_s += time.process_time() - began
-        began = time.process_time()
-        k, rows = (task.numbers.size - 5) // 2, code.N_WORK if is_taylor else code.N_BASIS
-        sizes = np.array(
-            [rows, *code.JACOBIAN_LENGTHS, code.SWITCHES, code.HOLDS, code.TIMED, k, task.tau.size, 0, route.MOST_STEPS]
-        )
-        report, work = np.empty(4 + 3 * taylor.MOST_EVENTS), np.empty(route.work_size(rows, k))
-        arrays = (
-            task.q, sizes, task.layout, task.columns, task.values, task.numbers, task.tau, task.out, report, work,
-            route.TABLE,
-        )  # fmt: skip
-        places = [array.ctypes.data for array in arrays]
-        tolerance = max(route.FIRST * accuracy / (1.0 + 0.3 * float(task.tau[-1] - task.numbers[3])), route.FLOOR)
-        evaluations = total = 0
-        for _attempt in range(6):
-            order = min(max(int(1.5 - 0.7 * math.log(tolerance)), 6), taylor.MAX_ORDER)
-            sizes[8], task.numbers[4] = order, tolerance
-            integrate(address, *places)
-            status, steps, found, error = report[:4].tolist()
-            total += int(steps)
-            evaluations += int(steps) * (order if is_taylor else route.STAGES)
-            if status != taylor.DONE or error <= accuracy or tolerance <= route.FLOOR:
-                break
-            tolerance = max(tolerance * 0.3 * accuracy / error, route.FLOOR)
-        if status == taylor.TOO_MANY_STEPS and route.MOST_STEPS == taylor.MOST_STEPS:
-            raise JobError(
-                f"the equation needs more than {route.MOST_STEPS} steps; shorten the time or soften the stiffest effect"
-            )
-        if status != taylor.DONE:
-            return None
-        cost = SolveCost(time.process_time() - began, compile_s, evaluations, total)
-        method = f"Taylor series of order {order}" if is_taylor else route.METHOD
-        return _Result(error, method, cost, report[4 : 4 + 3 * int(found)].reshape(-1, 3))
-
-    def _is_stiff(self, task: _Task, entries: tuple[float, ...]) -> bool:
-        """Does the velocity decay so much faster than the motion that an explicit method would crawl?"""
-        code = self.code
-        if code.HOLDS or not code.ROWS[2]:
-            return False
-        basis = [0.0] * code.N_BASIS
-        try:
-            code.terms(entries, (task.numbers[3], task.numbers[1], max(abs(task.numbers[2]), 1.0), 1.0), basis)
-        except ArithmeticError:  # a singularity at the start: the integrators deal with it
-            return False
-        first = code.N_INNER + len(code.ROWS[0]) + len(code.ROWS[1])
-        decay = -sum([entries[first + i] * basis[column] for i, column in enumerate(code.ROWS[2])])
-        return decay > 30 and decay * (float(task.tau[-1]) - task.numbers[3]) > 3000
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What an integrator is given, in scaled time; `out` and `events` are filled by it."""
-
-    q: np.ndarray
-    layout: np.ndarray
-    columns: np.ndarray
-    values: np.ndarray
-    numbers: np.ndarray  # rate, θ, w, start, tolerance, and δθ, δw of each sensitivity at the start
-    tau: np.ndarray
-    out: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Result:
-    error: float
-    method: str
-    cost: SolveCost
-    events: np.ndarray  # (m, 3): kind, τ, θ
-
-
-@dataclass(frozen=True)
-class Flight:
-    """Free flight: the downward pull in m/s², and the whole acceleration (t, position, velocity) where there is more."""
-
-    g_m_per_s2: float
-    acceleration: Any
 
 
 @dataclass(frozen=True)

@@ -9,27 +9,18 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
 from numba import njit
 
-from toolkit.motion import dop853_table
-from toolkit.motion.friction import held_until, leave_rest
-from toolkit.motion.pointer import call_terms, skip
-from toolkit.motion.taylor import DONE, MOST_EVENTS, MOST_STEPS, NOT_FINITE, TOO_MANY_STEPS  # noqa: F401
+from toolkit.motion.kernels import dop853_table
+from toolkit.motion.kernels.friction import held_until, leave_rest
+from toolkit.motion.kernels.pointer import call_terms, reals, skip, wholes
+from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, TOO_MANY_STEPS
 
-METHOD, STAGES = "Runge–Kutta DOP853", 12
-FIRST, FLOOR = 0.1, 1e-15
-
-_TABLES = ("A", "NODES", "E3", "E5", "D")
-TABLE = np.concatenate([getattr(dop853_table, name).ravel() for name in _TABLES])
-_STARTS = np.cumsum([0, *[getattr(dop853_table, name).size for name in _TABLES]]).tolist()
-_C, _E3, _E5, _D = _STARTS[1:5]
 _WIDE, _E = dop853_table.A.shape[1], dop853_table.D.shape[1]
-
-
-def work_size(n_basis: int, sensitivities: int) -> int:
-    """Numbers of working memory that `integrate` needs."""
-    return 4 + n_basis + 1 + (4 + 2 * sensitivities) * (3 + 16 + 7)
+_C = dop853_table.A.size
+_E3 = _C + dop853_table.NODES.size
+_E5 = _E3 + dop853_table.E3.size
+_D = _E5 + dop853_table.E5.size
 
 
 @njit
@@ -69,11 +60,20 @@ def _stages(
         _slope(address, q, layout, columns, values, s, B, z, m, skip(K, m * i))
 
 
-def integrate(
-    address: int, q: Any, sizes: Any, layout: Any, columns: Any, values: Any, numbers: Any, t: Any, out: Any, report: Any,
-    work: Any, table: Any,
-) -> None:  # fmt: skip
-    """As `taylor.integrate`; `address` of the terms, `table` the numbers of DOP853."""
+def dop853(places: Any) -> None:
+    """Fill `out` and `report`: see `routes`; `address` is that of the equation's terms."""
+    sizes = wholes(places, 0)
+    q = reals(places, 1)
+    layout = wholes(places, 2)
+    columns = wholes(places, 3)
+    values = reals(places, 4)
+    numbers = reals(places, 5)
+    t = reals(places, 6)
+    out = reals(places, 7)
+    report = reals(places, 8)
+    work = reals(places, 9)
+    table = reals(places, 10)
+    address = sizes[10]
     switches = sizes[3]
     count = sizes[7]
     m = 4 + 2 * sizes[6]

@@ -8,47 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numba import njit
 
-from toolkit.motion.pointer import call_terms, skip
-from toolkit.motion.taylor import DONE, NOT_FINITE, TOO_MANY_STEPS
-
-METHOD, STAGES = "Rodas4, L-stable", 7
-FIRST, FLOOR = 0.03, 1e-15
-MOST_STEPS = 200_000
-
-# fmt: off
-GAMMA = 0.25
-A = np.array([
-    [0.0, 0.0, 0.0, 0.0, 0.0],
-    [1.544, 0.0, 0.0, 0.0, 0.0],
-    [0.9466785280815826, 0.2557011698983284, 0.0, 0.0, 0.0],
-    [3.314825187068521, 2.896124015972201, 0.9986419139977817, 0.0, 0.0],
-    [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 0.0],
-    [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1.0],
-])
-C = np.array([
-    [0.0, 0.0, 0.0, 0.0, 0.0],
-    [-5.6688, 0.0, 0.0, 0.0, 0.0],
-    [-2.430093356833875, -0.2063599157091915, 0.0, 0.0, 0.0],
-    [-0.1073529058151375, -9.594562251023355, -20.47028614809616, 0.0, 0.0],
-    [7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160, 0.0],
-    [8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054],
-])
-NODES = np.array([0.0, 0.386, 0.21, 0.63, 1.0, 1.0])
-SLOPES = np.array([0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0])
-H2 = np.array([10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823, 1.025137723295662])
-H3 = np.array([-0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76722511418386, -6.594389125716872])
-# fmt: on
-
-
-TABLE = np.concatenate([a.ravel() for a in (A, C, NODES, SLOPES, H2, H3)])
-
-
-def work_size(n_basis: int, sensitivities: int) -> int:
-    """Numbers of working memory that `integrate` needs."""
-    return 4 + 12 + n_basis + 1
+from toolkit.motion.kernels.pointer import call_terms, reals, skip, wholes
+from toolkit.motion.kernels.rodas_table import GAMMA
+from toolkit.motion.routes import DONE, NOT_FINITE, TOO_MANY_STEPS
 
 
 @njit
@@ -59,11 +23,20 @@ def _row(layout: Any, columns: Any, values: Any, B: Any, row: int) -> float:
     return total
 
 
-def integrate(
-    address: int, q: Any, sizes: Any, layout: Any, columns: Any, values: Any, numbers: Any, t: Any, out: Any, report: Any,
-    work: Any, table: Any,
-) -> None:  # fmt: skip
-    """As `taylor.integrate`, without sensitivities and turning points; `address` of the terms, `table` Rodas4's numbers."""
+def rodas(places: Any) -> None:
+    """Fill `out` and `report`: see `routes`; no turning points; `address` is that of the equation's terms."""
+    sizes = wholes(places, 0)
+    q = reals(places, 1)
+    layout = wholes(places, 2)
+    columns = wholes(places, 3)
+    values = reals(places, 4)
+    numbers = reals(places, 5)
+    t = reals(places, 6)
+    out = reals(places, 7)
+    report = reals(places, 8)
+    work = reals(places, 9)
+    table = reals(places, 10)
+    address = sizes[10]
     count = sizes[7]
     tolerance = numbers[4]
     s = work

@@ -14,20 +14,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
 from numba import njit
 
-from toolkit.motion.friction import held_until, leave_rest
-from toolkit.motion.generate import ROW
-from toolkit.motion.pointer import call_jet, skip
+from toolkit.motion.kernels.friction import held_until, leave_rest
+from toolkit.motion.kernels.pointer import call_jet, reals, skip, wholes
+from toolkit.motion.routes import BLOCK, DONE, MOST_EVENTS, NOT_FINITE, ROW, TOO_MANY_STEPS
 
-DONE, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2
-MAX_ORDER = ROW - 2
-MOST_STEPS = 20_000_000
-FIRST, FLOOR = 0.1, 1e-17  # first tolerance per accuracy asked for; the least
-SAFETY = 2.5  # the plain estimate has been up to 2.7 times too small (benchmarks/integrators.py accuracy)
-TABLE = np.array([0.0] + [1.0 / k for k in range(1, ROW + 1)])
-_BLOCK = 256  # samples at a time: they stay in the fastest cache
+_SAFETY = 2.5  # the plain estimate has been up to 2.7 times too small (benchmarks/integrators.py accuracy)
 
 
 @njit(fastmath={"contract"})
@@ -66,8 +59,11 @@ def _sample(c: Any, n: int, x: Any, count: int, out: Any) -> None:
 
 
 @njit
-def _turning_point(w: Any, n: int, h: float, sign: float) -> tuple[float, bool]:
-    """The first x in (0, h] where sign·w(x) falls below 0 (or −1), and whether w is against `sign` from the start."""
+def _turning_point(w: Any, n: int, h: float, sign: float, x: Any) -> tuple[float, bool]:
+    """The first time in (0, h] where sign·w falls below 0 (or −1), and whether w is against `sign` from the start.
+
+    x : room for 16 numbers.
+    """
     rest, power = 0.0, 1.0
     for k in range(2, n + 1):
         power *= h
@@ -76,35 +72,40 @@ def _turning_point(w: Any, n: int, h: float, sign: float) -> tuple[float, bool]:
         return -1.0, False
     if w[0] == 0.0 and abs(w[1]) > rest:  # leaves rest and does not come back
         return -1.0, sign * w[1] < 0.0
-    left = 0.0
-    for i in range(1, 7):
-        right = h * i / 6.0
-        if sign * _value(w, n, right) < 0.0:
-            if left == 0.0 and w[0] == 0.0:
+    v = skip(x, 8)
+    for i in range(8):
+        x[i] = h * (i + 1) / 8.0
+    _sample(w, n, x, 8, v)
+    left, before = 0.0, w[0]
+    for i in range(8):
+        if sign * v[i] < 0.0:
+            if left == 0.0 and before == 0.0:
                 # leaving a turning point: the motion is against the sign, or turns again within this part
-                left = right * 1e-3
-                if sign * _value(w, n, left) < 0.0:
+                left = x[i] * 1e-3
+                before = _value(w, n, left)
+                if sign * before < 0.0:
                     return -1.0, True
-            return _root(w, n, left, right, sign), False
-        left = right
+            return _root(w, n, left, x[i], before, v[i], sign), False
+        left, before = x[i], v[i]
     return -1.0, False
 
 
 @njit
-def _root(w: Any, n: int, left: float, right: float, sign: float) -> float:
-    """The zero of w in a bracket, to the last digit: Newton's steps, halving where they leave the bracket."""
-    x = 0.5 * (left + right)
+def _root(w: Any, n: int, left: float, right: float, at_left: float, at_right: float, sign: float) -> float:
+    """The zero of w in a bracket, to the last digit: Newton's steps from the chord, halving where they leave the bracket."""
+    x = left + (right - left) * at_left / (at_left - at_right)
     for _ in range(100):
-        value, slope = _value(w, n, x), _slope(w, n, x)
+        value, slope = w[n], 0.0
+        for k in range(n - 1, -1, -1):
+            slope = slope * x + value
+            value = value * x + w[k]
         if sign * value < 0.0:
             right = x
         else:
             left = x
         near = x - value / slope if slope != 0.0 else right
-        if not left < near < right:
+        if not left <= near <= right:
             near = 0.5 * (left + right)
-            if near <= left or near >= right:
-                break
         if abs(near - x) <= 1e-16 * right:
             return near
         x = near
@@ -146,30 +147,20 @@ def _variational(J: Any, by_theta: int, by_w: int, D: Any, F: Any, n: int, R: An
         E[k + 1] = (v + u) * R[k + 1]
 
 
-MOST_EVENTS = 64
-"""Kept in `report`, which holds status, steps, events found, largest error, then (kind, τ, θ) of each event."""
-
-
-def work_size(n_work: int, sensitivities: int) -> int:
-    """Numbers of working memory that `integrate` needs."""
-    return n_work * ROW + 2 * ROW + 2 * (sensitivities + 1) * ROW + ROW + _BLOCK + 6
-
-
-def integrate(
-    address: int,  # of the equation's jet
-    q: Any,  # inner constants, then the coefficients of F
-    sizes: Any,  # rows of the jet's memory, lengths of F_θ and F_w, switches, holds, timed, sensitivities, samples, order, most steps
-    layout: Any,  # where each matrix row starts in columns/values; rows: F, F_θ, F_w, F_τ, sensitivities
-    columns: Any,
-    values: Any,
-    numbers: Any,  # rate, θ, w, start, tolerance, then δθ, δw of each sensitivity at the start
-    t: Any,
-    out: Any,  # (2 + 2k, n): θ, w, then δθ, δw of each sensitivity
-    report: Any,
-    work: Any,
-    R: Any,
-) -> None:
-    """Fill `out` at the scaled times t ≥ start, and `report`."""
+def taylor(places: Any) -> None:
+    """Fill `out` and `report`: see `routes`; `address` is that of the equation's jet."""
+    sizes = wholes(places, 0)
+    q = reals(places, 1)  # inner constants, then the coefficients of F
+    layout = wholes(places, 2)
+    columns = wholes(places, 3)
+    values = reals(places, 4)
+    numbers = reals(places, 5)
+    t = reals(places, 6)
+    out = reals(places, 7)
+    report = reals(places, 8)
+    work = reals(places, 9)
+    R = reals(places, 10)
+    address = sizes[10]
     by_theta = sizes[1]
     by_w = sizes[2]
     switches = sizes[3]
@@ -182,7 +173,7 @@ def integrate(
     s = work  # the present time, θ, w and its sign
     lost = skip(work, 4)  # what the last sums of θ and w lost
     x = skip(lost, 2)
-    F = skip(x, _BLOCK)
+    F = skip(x, BLOCK)
     J = skip(F, ROW)
     D = skip(J, 2 * ROW)  # rows: δθ, δw of each sensitivity, then error of θ, of w
     error = skip(D, 2 * k_sens * ROW)
@@ -199,7 +190,6 @@ def integrate(
     seed = 1
     sign = 1.0 if s[2] > 0.0 else -1.0
     resting = switches != 0 and s[2] == 0.0
-    rough = n if n < 8 else 8  # terms: the error need not be known to many digits
     end = t[count - 1]
     report[0] = DONE
     held = True  # for the samples at the start itself
@@ -246,29 +236,37 @@ def integrate(
         call_jet(address, q, s, W, R, n)
         steps += 1
         if passed > 0.0:  # what the last step's series lacked at its end
-            missing = SAFETY * passed * abs(W[2 * ROW] - slope) / (n + 1) - counted
+            missing = _SAFETY * passed * abs(W[2 * ROW] - slope) / (n + 1) - counted
             if missing > 0.0:
                 error[0] += math.copysign(passed * missing / (n + 2), error[0])
                 error[ROW] += math.copysign(missing, error[ROW])
                 worst = max(worst, abs(error[0]))
         h = end - hi - lo
+        least = 1e300
         for k in range(n - 1, n + 1):
             last = max(abs(W[k]), abs(w_row[k]))
             if last > 0.0:
-                h = min(h, math.exp(math.log(tolerance / last) / k))
+                least = min(least, math.log(tolerance / last) / k)
+        if least < 1e300:
+            h = min(h, math.exp(least))
         if not (h > 0.0 and h < 1e300):
             report[0] = NOT_FINITE
             break
         turned = False
         if switches != 0:
-            root, against = _turning_point(w_row, n, h, sign)
+            root, against = _turning_point(w_row, n, h, sign, x)
             if against:
                 sign = s[3] = -sign
                 call_jet(address, q, s, W, R, n)
-                root, against = _turning_point(w_row, n, h, sign)
+                root, against = _turning_point(w_row, n, h, sign, x)
             if root >= 0.0:
                 h = root
                 turned = True
+        if k_sens > 0:
+            call_jet(sizes[11], q, s, W, R, n)
+        rough = 5 + int(3.0 * h) if h < 8.0 else n  # terms: the error need not be known to many digits
+        if rough > n:
+            rough = n
         for a in range(2):  # F_θ, F_w
             length = (n if k_sens > 0 else rough) if sizes[1 + a] == 2 else 1
             _combine(W, skip(columns, 1), values, layout[1 + a], layout[2 + a], length, skip(J, a * ROW))
@@ -278,11 +276,14 @@ def integrate(
             _variational(J, by_theta, by_w, skip(D, 2 * a * ROW), F, length, R)
         while i < count:  # samples inside this step
             some = 0
-            while some < _BLOCK and i + some < count and (t[i + some] - hi) - lo <= h:
-                x[some] = (t[i + some] - hi) - lo
+            while some + 8 <= BLOCK and i + some + 8 <= count and (t[i + some + 7] - hi) - lo <= h:
+                some += 8
+            while some < BLOCK and i + some < count and (t[i + some] - hi) - lo <= h:
                 some += 1
             if some == 0:
                 break
+            for j in range(some):
+                x[j] = (t[i + j] - hi) - lo
             for a in range(2 + 2 * k_sens):
                 series = skip(W, a * ROW) if a < 2 else skip(D, (a - 2) * ROW)
                 _sample(series, n, x, some, skip(out, a * count + i))
@@ -294,7 +295,9 @@ def integrate(
         hi = new
         for a in range(2 * k_sens + 2):
             D[a * ROW] = _value(skip(D, a * ROW), n if a < 2 * k_sens else rough, h)
-        power = 0.3 * SAFETY * h ** (n - 1)
+        power = 0.3 * _SAFETY
+        for _ in range(n - 1):
+            power *= h
         seed = (seed * 1103515245 + 12345) % 2147483648
         rounding = 2.2e-16 if seed < 1073741824 else -2.2e-16  # rounding errors add like a random walk
         for a in range(2):
@@ -315,7 +318,7 @@ def integrate(
         s[0] = hi + lo
         s[3] = sign
         call_jet(address, q, s, W, R, 1)
-        missing = SAFETY * passed * abs(W[2 * ROW] - slope) / (n + 1) - counted
+        missing = _SAFETY * passed * abs(W[2 * ROW] - slope) / (n + 1) - counted
         worst = max(worst, abs(error[0]) + passed * max(missing, 0.0) / (n + 2))
     report[1] = steps
     report[2] = found

@@ -74,3 +74,5 @@ A = _matrix(WEIGHTS, (16, 16))
 E5 = _matrix({0: ERROR_5}, (1, 16))[0]
 E3 = _matrix({0: ERROR_3}, (1, 16))[0]
 D = _matrix(dict(enumerate(INTERPOLANT)), (4, 16))
+
+TABLE = np.concatenate([part.ravel() for part in (A, NODES, E3, E5, D)])

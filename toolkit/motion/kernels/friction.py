@@ -7,8 +7,8 @@ from typing import Any
 
 from numba import njit
 
-from toolkit.motion.generate import ROW
-from toolkit.motion.pointer import call_jet, call_terms
+from toolkit.motion.kernels.pointer import call_jet, call_terms
+from toolkit.motion.routes import ROW
 
 
 @njit

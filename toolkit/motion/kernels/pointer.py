@@ -9,9 +9,30 @@ from typing import Any
 
 from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 REALS, WHOLES = types.CPointer(types.float64), types.CPointer(types.int64)
+
+
+def _at(kind: Any, places: Any) -> Any:
+    def load(context: Any, builder: Any, _: Any, values: Any) -> Any:
+        address = builder.load(builder.gep(values[0], [values[1]]))
+        return builder.inttoptr(address, context.get_value_type(kind))
+
+    return kind(places, types.int64), load
+
+
+@intrinsic
+def reals(typing: Any, places: Any, number: Any) -> Any:
+    """The array of float64 whose address is the numbered one of `places`."""
+    return _at(REALS, places)
+
+
+@intrinsic
+def wholes(typing: Any, places: Any, number: Any) -> Any:
+    """The array of int64 whose address is the numbered one of `places`."""
+    return _at(WHOLES, places)
 
 
 @intrinsic
@@ -21,10 +42,13 @@ def skip(typing: Any, pointer: Any, count: Any) -> Any:
 
 
 def _call(builder: Any, values: Any) -> Any:
+    """Numba's functions take two addresses more: where the result goes, and an exception, of which there is none."""
     address, *rest = values
-    function = ir.FunctionType(ir.VoidType(), [v.type for v in rest])
-    builder.call(builder.inttoptr(address, function.as_pointer()), rest)
-    return ir.Constant(ir.IntType(8).as_pointer(), None)
+    nothing = ir.Constant(ir.IntType(8).as_pointer(), None)
+    result = cgutils.alloca_once(builder, nothing.type)
+    function = ir.FunctionType(ir.IntType(32), [result.type, nothing.type, *[v.type for v in rest]])
+    builder.call(builder.inttoptr(address, function.as_pointer()), [result, nothing, *rest])
+    return nothing
 
 
 @intrinsic
