@@ -30,6 +30,7 @@ class Look(NamedTuple):
     radius_px, edge_px : radius and standard deviation of its edge.    contrast : bob minus wall, in grey levels.
     noise : typical misfit of a good fit, in grey levels.    template : (k, k) float32 mean picture, or None.
     radius_free : the bob's size changes along its way (perspective, focus): it is to be fitted on every frame.
+    even : the bob has one shade, or one that changes evenly across it; False for a pattern or a highlight.
     """
 
     radius_px: float
@@ -38,6 +39,7 @@ class Look(NamedTuple):
     noise: float = np.inf
     template: np.ndarray | None = None
     radius_free: bool = False
+    even: bool = True
 
 
 class Guess(NamedTuple):
