@@ -11,8 +11,15 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-H_PER_SIGMA = 2.6457513110645907  # √7: half width of the edge's biweight kernel over its standard deviation
-MARGIN = 1.0  # px that the outline may move before the pixels are listed anew
+# The edge is the integral of the compact kernel (1 − v²)² (A + B v² + C v⁴) / h, v = depth/h, fitted to the normal
+# distribution (to 0.001 of its integral). As polynomials in q = v²: E = 1/2 + v (E0 + E1 q + …), its integral over v
+# from 0 is v/2 + q (I0 + I1 q + …).
+_A, _B, _C = 1.2671444456449772, -3.4568857330475984, 3.448123840312871
+H_PER_SIGMA = 3.2089677624128700
+K0, K1, K2, K3, K4 = _A, _B - 2 * _A, _A - 2 * _B + _C, _B - 2 * _C, _C
+E0, E1, E2, E3, E4 = K0, K1 / 3, K2 / 5, K3 / 7, K4 / 9
+I0, I1, I2, I3, I4 = E0 / 2, E1 / 4, E2 / 6, E3 / 8, E4 / 10
+MARGIN = 0.8  # px that the outline may move before the pixels are listed anew
 SECTORS = 24
 _SUMS_IN_ANY_ORDER = {"reassoc", "contract", "nsz"}
 
@@ -77,12 +84,12 @@ def measure_depth(x, y, cx, cy, radius, soft, depth, nearness):
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS_IN_ANY_ORDER)
 def cover_still(depth, soft, share, rise, widen):
     """Add what a disc at rest covers of each pixel, and its slopes with the radius and with h."""
-    peak = 0.9375 / soft
+    narrow = 1.0 / soft
     for i in range(depth.size):
         v = min(1.0, max(-1.0, depth[i]))
         q = v * v
-        e = peak * (1.0 - q) * (1.0 - q)
-        share[i] += 0.5 + 0.9375 * v * (1.0 - q * (0.6666666666666666 - 0.2 * q))
+        e = narrow * (K0 + q * (K1 + q * (K2 + q * (K3 + q * K4))))
+        share[i] += 0.5 + v * (E0 + q * (E1 + q * (E2 + q * (E3 + q * E4))))
         rise[i] += e
         widen[i] -= e * v
 
@@ -94,21 +101,24 @@ def cover_piece(before, after, part, soft, share, rise, widen):
         a, b = before[i], after[i]
         pa, pb = min(1.0, max(-1.0, a)), min(1.0, max(-1.0, b))
         qa, qb = pa * pa, pb * pb
-        # the edge function's integral at both ends; a short way is taken as one of 1e-3, for its middle counts
-        ia = 0.5 * (a + abs(a - pa)) + 0.9375 * qa * (0.5 - qa * (0.16666666666666666 - 0.03333333333333333 * qa))
-        ib = 0.5 * (b + abs(b - pb)) + 0.9375 * qb * (0.5 - qb * (0.16666666666666666 - 0.03333333333333333 * qb))
+        # the edge function's integral at both ends, which goes on straight beyond ±1
+        ia = 0.5 * (a + abs(a - pa)) + qa * (I0 + qa * (I1 + qa * (I2 + qa * (I3 + qa * I4))))
+        ib = 0.5 * (b + abs(b - pb)) + qb * (I0 + qb * (I1 + qb * (I2 + qb * (I3 + qb * I4))))
         v = min(1.0, max(-1.0, 0.5 * (a + b)))
         q = v * v
-        middle = 0.5 + 0.9375 * v * (1.0 - q * (0.6666666666666666 - 0.2 * q))
+        middle = 0.5 + v * (E0 + q * (E1 + q * (E2 + q * (E3 + q * E4))))
         share[i] += part * (middle if abs(b - a) < 1e-3 else (ib - ia) / (b - a))
-    peak = 0.9375 * part / soft
+    narrow = part / soft
     for i in range(before.size):
         a, b = before[i], after[i]
         pa, pb = min(1.0, max(-1.0, a)), min(1.0, max(-1.0, b))
         qa, qb = pa * pa, pb * pb
-        ea, eb = pa * (1.0 - qa * (0.6666666666666666 - 0.2 * qa)), pb * (1.0 - qb * (0.6666666666666666 - 0.2 * qb))
+        ea = pa * (E0 + qa * (E1 + qa * (E2 + qa * (E3 + qa * E4))))
+        eb = pb * (E0 + qb * (E1 + qb * (E2 + qb * (E3 + qb * E4))))
         v = min(1.0, max(-1.0, 0.5 * (a + b)))
-        e = peak * ((1.0 - v * v) * (1.0 - v * v) if abs(b - a) < 1e-3 else (eb - ea) / (b - a))
+        q = v * v
+        middle = K0 + q * (K1 + q * (K2 + q * (K3 + q * K4)))
+        e = narrow * (middle if abs(b - a) < 1e-3 else (eb - ea) / (b - a))
         rise[i] += e
         widen[i] -= e * v
 
@@ -219,9 +229,9 @@ def solve(lower, right, step, free):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def look_around(x, y, share, weight, wall, rest, disc, most):
-    """In how much of the outline's sectors the bob was seen, the mean level of the wall beside it, and the misfit (rms,
-    each pixel's at most `most`) where the bob hides the wall altogether; NaN where no such pixel was listed.
+def look_around(x, y, share, wall, rest, disc, clean):
+    """In how much of the outline's sectors the bob was seen (the model is off by `clean` at most), the mean level of the
+    wall beside it, and the misfit (rms, each pixel's at most 2 `clean`) well inside; NaN where no such pixel was listed.
 
     What hides the bob is seen on it, what stands behind it only beside it: pixels that are the bob's for the most part count.
     """
@@ -237,15 +247,19 @@ def look_around(x, y, share, weight, wall, rest, disc, most):
         turn = dy / (abs(dx) + abs(dy) + 1e-12)  # sectors of equal diamond angle: no arctangent
         sector = int((1.0 + turn if dx >= 0.0 else 3.0 - turn) * (0.25 * SECTORS - 1e-6))
         total[sector] += 1.0
-        good[sector] += weight[i] > 0.0
+        good[sector] += abs(rest[i]) <= clean
         if dx * dx + dy * dy < 0.64 * disc[2] * disc[2] and share[i] > 0.999:
-            squares += min(abs(rest[i]), most) ** 2
+            squares += min(abs(rest[i]), 2.0 * clean) ** 2
             within += 1
     clear = present = 0
     for k in range(SECTORS):
         present += total[k] > 0.0
         clear += total[k] > 0.0 and good[k] > 0.7 * total[k]
-    return clear / max(1, present), level / beside if beside else np.nan, np.sqrt(squares / within) if within else np.nan
+    return (
+        clear / max(1, present),
+        level / beside if beside else np.nan,
+        np.sqrt(squares / within) if within else np.nan,
+    )
 
 
 # one signature for patches of any layout: each would be compiled by itself, and this is the longest to compile
@@ -271,7 +285,9 @@ def fit(image, back, seen, start, streak, string, noise, contrast, free, inside,
     length = np.sqrt(streak[0] * streak[0] + streak[1] * streak[1])
     normal, lower = np.zeros((8, 8)), np.zeros((8, 8))
     right, step = np.zeros(8), np.zeros(8)
-    shade = np.zeros(4)  # f0, fx, fy, gain: all 0 at first where nothing is known, then the first step finds these alone
+    shade = np.zeros(
+        4
+    )  # f0, fx, fy, gain: all 0 at first where nothing is known, then the first step finds these alone
     first = 0 if contrast != 0.0 else 1  # the first turn on which the centre moves
     lists, slope = np.empty((13, 0)), np.empty((8, 0))
     moved = np.inf
@@ -279,17 +295,25 @@ def fit(image, back, seen, start, streak, string, noise, contrast, free, inside,
     level, cut = 0.0, np.inf
     settled = False
     for turn in range(turns + first):
-        if moved > 0.7 * MARGIN:
+        if moved > 0.75 * MARGIN:
             width = 2.0 * (disc[3] + MARGIN) + 1.3 * length + 0.25 * length * length / disc[2]
             room = 6.3 * (disc[2] + 3.0) * width + (0.8 * disc[2] * disc[2] if inside else 0.0) + 64.0
             lists = np.empty((13, int(min(rows * columns, room))))
-            count = gather(image, back, seen, disc, streak, string, inside, lists[0], lists[1], lists[2], lists[3], lists[4])
+            count = gather(
+                image, back, seen, disc, streak, string, inside, lists[0], lists[1], lists[2], lists[3], lists[4]
+            )
             if count < 12:
                 return False
             slope = np.empty((8, count))
             for k in range(4):
                 listed[k] = disc[k]
-        x, y, bright, wall, doubt = lists[0, :count], lists[1, :count], lists[2, :count], lists[3, :count], lists[4, :count]
+        x, y, bright, wall, doubt = (
+            lists[0, :count],
+            lists[1, :count],
+            lists[2, :count],
+            lists[3, :count],
+            lists[4, :count],
+        )
         share, rise, widen, nearness = lists[5, :count], lists[6, :count], lists[7, :count], lists[8, :count]
         rest, weight, spare = lists[9, :count], lists[10, :count], lists[11, :count]
         if turn == 0:
@@ -332,7 +356,9 @@ def fit(image, back, seen, start, streak, string, noise, contrast, free, inside,
         weights += weight[i]
     for a in range(free):  # by the last step, which was not looked at again
         gained += (2.0 - damp) * damp * step[a] * right[a]
-    visible, level, within = look_around(x, y, share, weight, wall, rest, disc, cut)
+    visible, level, within = look_around(
+        x, y, share, wall, rest, disc, max(5.0 * noise, 0.12 * abs(shade[0] - shade[3] * level))
+    )
     if not settled or weights < 6.0 or np.isnan(level):
         return False
     misfit = np.sqrt(max(0.0, squares - gained) / max(1.0, weights - free))

@@ -3,8 +3,8 @@ background that the clip has shown, on a ring of pixels about the outline and, w
 of those within it (they tell the shade, which the outline alone confuses with the place).
 
 Model of a pixel: g·back·(1 − α) + (f0 + fx·dx/R + fy·dy/R)·α, with α the mean over the streak of the edge function
-E((R − d)/h). E is the integral of the biweight kernel (compact, variance h²/7: no exponential to evaluate).
-Gauss–Newton over (cx, cy, f0, fx, fy, g) and, when calibrating, (R, h = √7 s); pixels far off the model do not count.
+E((R − d)/h). E is the integral of a compact kernel very near to the normal distribution's: no exponential to evaluate.
+Gauss–Newton over (cx, cy, f0, fx, fy, g) and, when calibrating, (R, h); pixels far off the model do not count.
 """
 
 from __future__ import annotations
