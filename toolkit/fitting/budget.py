@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -158,18 +158,9 @@ def _gradient(result: FitResult, quantity: str) -> np.ndarray:
     """Derivatives of the quantity by the free parameters (exact for a parameter, numerical for a derived one)."""
     if quantity in result.free:
         return np.eye(len(result.free))[result.free.index(quantity)]
-    from toolkit.fitting.derived import derive
+    from toolkit.fitting.derived import derived_with_gradients
 
-    values = {name: p.value for name, p in result.parameters.items()}
-    gradient = np.zeros(len(result.free))
-    for i, name in enumerate(result.free):
-        step = 1e-3 * (result.parameters[name].stderr or abs(values[name]) * 1e-3 or 1e-9)
-        ends = []
-        for sign in (1, -1):
-            moved = {**result.parameters, name: replace(result.parameters[name], value=values[name] + sign * step)}
-            ends.append(derive(replace(result, parameters=moved), result.problem)[quantity].value)
-        gradient[i] = (ends[0] - ends[1]) / (2 * step)
-    return gradient
+    return derived_with_gradients(result, result.problem)[1][quantity]
 
 
 def _estimate(result: FitResult, name: str) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 _LARGEST_ORDER = 8
 _WHITE_P = 1e-3
 _LAGS = 20
+_GRID = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -103,19 +104,15 @@ def measure_noise(
 
 def autocorrelation(x: np.ndarray, lags: int) -> np.ndarray:
     """Autocorrelation of x at lags 1 … `lags` (biased estimate, mean not removed: residuals have none)."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
-    size = next_fast_len(2 * x.size)
-    full = irfft(np.abs(rfft(x, size)) ** 2, size)[: lags + 1]
-    return np.asarray(full[1:] / full[0])
+    return np.array([x[k:] @ x[:-k] for k in range(1, lags + 1)]) / (x @ x)
 
 
 def ljung_box(rho: np.ndarray, n: int) -> float:
     """p-value of Ljung and Box's Q = n(n+2) Σ ρ_k²/(n−k) against χ² with one degree of freedom a lag."""
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     lag = np.arange(1, rho.size + 1)
-    return float(chi2.sf(n * (n + 2) * np.sum(rho**2 / (n - lag)), rho.size))
+    return float(chdtrc(rho.size, n * (n + 2) * np.sum(rho**2 / (n - lag))))
 
 
 def runs_z(x: np.ndarray) -> float:
@@ -153,36 +150,25 @@ def spectrum(coefficients: tuple[float, ...] | np.ndarray, phase: float) -> floa
     if len(coefficients) == 0:
         return 1.0
     a = np.asarray(coefficients)
-    k = np.arange(1, a.size + 1)
-    return float(_innovation(a) / abs(1 - np.sum(a * np.exp(-1j * k * phase))) ** 2)
+    at_phase = abs(1 - np.sum(a * np.exp(-1j * np.arange(1, a.size + 1) * phase))) ** 2
+    return float(1 / (at_phase * np.mean(_power(a, _GRID))))
 
 
-def _innovation(a: np.ndarray) -> float:
-    """Variance of the white noise that drives an autoregression of unit variance."""
-    return 1 / float(np.sum(_response(a) ** 2))
-
-
-def _response(a: np.ndarray, longest: int = 1 << 15) -> np.ndarray:
-    """Response of the autoregression to one unit of noise, until it has died away."""
-    from scipy.signal import lfilter
-
-    size = 64
-    while True:
-        pulse = np.zeros(size)
-        pulse[0] = 1.0
-        response = np.asarray(lfilter([1.0], np.concatenate([[1.0], -a]), pulse))
-        if size >= longest or np.max(np.abs(response[-size // 4 :])) < 1e-7:
-            return response
-        size *= 2
+def _power(a: np.ndarray, size: int) -> np.ndarray:
+    """Power spectrum of x_i = Σ a_k x_{i−k} + unit white noise at the `size` frequencies of a Fourier transform."""
+    return np.asarray(1 / np.abs(np.fft.fft(np.concatenate([[1.0], -a]), size)) ** 2)
 
 
 def spread(jacobian: np.ndarray, noise: Noise) -> np.ndarray:
-    """Jᵀ R J (k, k) for residuals with that noise: J is (n, k), already divided by σ."""
+    """Jᵀ R J (k, k) for residuals with that noise: J is (n, k), already divided by σ. By Parseval: R is diagonal in
+    frequency once the columns are padded to beyond the reach of the correlation."""
     if len(noise.coefficients) == 0:
         return np.asarray(noise.scale_used**2 * (jacobian.T @ jacobian))
-    from scipy.signal import fftconvolve
+    from scipy.fft import next_fast_len, rfft
 
-    response = _response(np.asarray(noise.coefficients))
-    response = response / math.sqrt(float(np.sum(response**2)))
-    coloured = fftconvolve(jacobian[::-1], response[:, None], axes=0)
-    return np.asarray(noise.scale_used**2 * (coloured.T @ coloured))
+    size = 2 * next_fast_len(max(jacobian.shape[0], _GRID // 2))
+    power = _power(np.asarray(noise.coefficients), size)
+    weight = power[: size // 2 + 1] / (size * np.mean(power))
+    weight[1:-1] *= 2  # each frequency but the first and last stands for two
+    waves = rfft(jacobian, size, axis=0)
+    return np.asarray(noise.scale_used**2 * np.real(np.conj(waves.T) @ (waves * weight[:, None])))

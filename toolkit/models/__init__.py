@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ def model_names() -> tuple[str, ...]:
     return registry.part_names(sys.modules[__name__], _NOT_MODELS)
 
 
+@functools.cache
 def load_model(name: str) -> Model:
     """The model of that name. Raises UsageError for a name that is not a model."""
     model: Model = registry.load_part(sys.modules[__name__], name, "MODEL", _NOT_MODELS)
