@@ -30,7 +30,7 @@ __all__ = ["arc_pivot", "calibrate", "line_pivot", "write_calibration_json"]
 _CLICK_SIGMA_PX = 1.0
 _ODD_PX = 0.3  # arc and string disagree by so much for reasons of their own (a string's shading, the bob's shadow)
 _VIEW_U = 0.01  # where no view could be fitted: a camera some 8° off square (1 − cos 8°), or a phone's uncorrected lens
-_WIDE_U = 0.05  # an uncertainty of all angles that the user must hear of
+_WIDE_U = 0.08  # an uncertainty of all angles that the user must hear of
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
-from toolkit.tracking.clock import clock_slips, even_times, out_of_time
+from toolkit.tracking.clock import even_times, out_of_time, place_lost_frames
 from toolkit.tracking.follow import Follower
-from toolkit.tracking.scatter import true_sigma
+from toolkit.tracking.scatter import Factors, true_sigma
 from toolkit.tracking.shake import Shake
 from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.tracking.verdict import poor_motion, require_pendulum
@@ -26,7 +26,6 @@ from toolkit.tracking.view import Lines, View, fit_view
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
-_MOST = 3.0  # by how much a fit's own σ may be too small (noise that a codec has smeared)
 
 
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
@@ -213,18 +212,9 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     x, y = x + shift.raw_x - shift.x, y + shift.raw_y - shift.y
     swing = _whole_swing(start, t, x, y, good, video.path)
     require_pendulum(swing, t, x, y, good, video.path)
+    stamps = t
+    t, swing = place_lost_frames(t, x, y, swing, good, np.array(r.repeated), warnings)
     mx, my = swing.position(t)
-    slips = clock_slips(t, x - mx, y - my, swing, good)
-    if slips.size:
-        warnings.append(
-            said(
-                "track.clock_slips",
-                "the clock of the file slips by whole frames at {places} place(s), first at t = {t_s:.3f} s (a camera that lost "
-                "or repeated frames and did not say so); the error bars allow for it",
-                places=int(slips.size),
-                t_s=float(t[slips[0]]),
-            )
-        )
     good = good & ~out_of_time(r, t, x - mx, y - my, swing, good, log, warnings)
     for a in (x, y, sx, sy):
         a[~good] = np.nan
@@ -234,21 +224,23 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         strings[k] = line
     lines = strings[good & np.isfinite(strings[:, 2])]
     view: View | None = None
+
+    def _scatter(rx: np.ndarray, ry: np.ndarray) -> Factors:
+        v = swing.velocity(t[good])
+        known = shift.sigma[good], time_sigma, follower.shaking
+        return true_sigma((rx[good], ry[good]), (sx[good], sy[good]), v, *known)
+
     for _ in range(2):  # error bars and the view of the camera each need the other
         vx, vy = (np.hypot(v * time_sigma, shift.sigma) for v in swing.velocity(t))
-        scale = true_sigma(x - mx, sx, good, vx), true_sigma(y - my, sy, good, vy)
-        sigma = shift.sigma
-        if follower.shaking and max(scale) > _MOST:  # more than the picture explains: the shake is known no better
-            left = [np.sqrt(max(f**2 - _MOST**2, 0.0)) * np.median(s[good]) for f, s in zip(scale, (sx, sy))]
-            sigma = np.hypot(sigma, float(np.hypot(*left)) / np.sqrt(2))
-            scale = min(scale[0], _MOST), min(scale[1], _MOST)
+        scale = _scatter(x - mx, y - my)
+        sigma = np.hypot(shift.sigma, scale.shake_px)
         before = view
         view = fit_view(
             t[good] / fps_factor,
             x[good],
             y[good],
-            np.hypot(sx * scale[0], vx)[good],
-            np.hypot(sy * scale[1], vy)[good],
+            np.sqrt((sx * scale.x) ** 2 + vx**2 + scale.shake_px**2)[good],
+            np.sqrt((sy * scale.y) ** 2 + vy**2 + scale.shake_px**2)[good],
             np.array(_at_first_measured(swing, t, good, fps_factor)),
             (video.width_px, video.height_px),
             Lines(*lines.T) if len(lines) >= 8 else None,
@@ -260,14 +252,16 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             break
         mx, my = view.position(t / fps_factor, mx, my)
         if not view.shown:
-            scale = true_sigma(x - mx, sx, good, vx), true_sigma(y - my, sy, good, vy)
             break
-    sx, sy = sx * scale[0], sy * scale[1]
+    scale = _scatter(x - mx, y - my)
+    sigma = np.hypot(shift.sigma, scale.shake_px)
+    sx, sy = sx * scale.x, sy * scale.y
     rms_px = float(np.sqrt(0.5 * np.mean((x - mx)[good] ** 2 + (y - my)[good] ** 2)))
-    typical = float(np.median(np.hypot(np.hypot(sx, sy)[good] / np.sqrt(2), sigma[good])))
+    late = time_sigma * np.hypot(*swing.velocity(t))
+    typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + sigma**2)[good])))
     motion = swing if view is None else view.swing(fps_factor)
     warnings += poor_motion(motion, t, good, rms_px, typical)
-    for odd in clock_warnings(t, video):  # what the stamps account for affects no result
+    for odd in clock_warnings(stamps, video):  # what the stamps account for affects no result
         (log if getattr(odd, "key", "") in _HARMLESS else warnings).append(odd)
     status = np.where(good, OK, LOST).astype("U9")
     bridged = _bridged(good, t, swing.period_s)
@@ -296,8 +290,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         said(
             "track.error_bars",
             "The error bars of the fit were multiplied by {x:.2f} (x) and {y:.2f} (y), the scatter seen about a smooth motion.",
-            x=float(scale[0]),
-            y=float(scale[1]),
+            x=scale.x,
+            y=scale.y,
         ),
     ]
     return Track(

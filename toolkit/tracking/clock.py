@@ -6,7 +6,7 @@ import numpy as np
 
 from toolkit.sentence import said
 from toolkit.tracking.follow import Record
-from toolkit.tracking.swing import Swing
+from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Video
 
 
@@ -18,13 +18,21 @@ def even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:
     tick = video.tick_s
     if tick < 2e-4 or t.size < 10:
         return t
-    n = np.arange(t.size)
-    rate = (t.size - 1) / (t[-1] - t[0]) if t[-1] > t[0] else 0.0
-    claimed = video.fps_header
-    if claimed and abs(claimed / max(rate, 1e-9) - 1) * t.size < 0.5 * (rate * tick) + 0.02 * rate * tick * t.size:
-        rate = claimed
-    if rate <= 0:
+    steps = np.diff(t)
+    if not np.any(steps > 0):
         return t
+    rate = 1 / float(np.median(steps[steps > 0]))
+    claimed = video.fps_header
+    if claimed and abs(claimed / rate - 1) < rate * tick:
+        rate = claimed
+    for _ in range(2):  # frames may be missing: each stamp's place on the grid is counted, then the grid is fitted
+        n = np.round((t - t[0]) * rate)
+        if np.any(np.diff(n) < 1):
+            return t
+        fitted = float(np.polyfit(n, t, 1)[0])
+        if claimed and abs(claimed * fitted - 1) * n[-1] < 0.6 * claimed * tick + 0.02 * claimed * tick * n[-1]:
+            fitted = 1 / claimed
+        rate = 1 / fitted
     grid = n / rate
     off = t - grid
     if np.ptp(off) > 1.05 * tick:
@@ -71,8 +79,8 @@ def out_of_time(
             )
         )
     leap &= ~repeats
-    if leap.any():
-        warnings.append(
+    if leap.any():  # a few are left out and done with; many mean a clock that cannot be trusted
+        (log if leap.mean() < 0.05 else warnings).append(
             said(
                 "track.leaps",
                 "{frames} frame(s) show the bob at another time than their stamp says (a camera that drops or repeats frames), "
@@ -84,8 +92,68 @@ def out_of_time(
     return leap | repeats
 
 
-def clock_slips(t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, good: np.ndarray) -> np.ndarray:
-    """The frames from which on the motion is early or late by whole frames for good.
+def place_lost_frames(
+    t: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    swing: Swing,
+    good: np.ndarray,
+    repeated: np.ndarray,
+    warnings: list[str],
+) -> tuple[np.ndarray, Swing]:
+    """Times with the frames put back that a camera lost without a gap in its stamps, and the motion fitted to them.
+
+    A lost frame shows as a leap of the motion by one frame's time, for good; nothing else does that. A leap backwards is
+    believed where a picture repeats the one before (`repeated`, (n,) bool), else only told.
+    """
+    step = float(np.median(np.diff(t)))
+    first, placed, odd = t.copy(), 0, 0
+    when: list[float] = []
+    for _ in range(6):
+        mx, my = swing.position(t)
+        slips = clock_slips(t, x - mx, y - my, swing, good)
+        lost = [(k, f) for k, f in slips if f > 0 or (f > -1.3 and repeated[max(0, k - 1) : k + 1].any())]
+        odd = len(slips) - len(lost)
+        if not lost:
+            break
+        moved = t.copy()
+        for k, frames in lost:
+            moved[k:] += frames * step
+        some = np.flatnonzero(good)[:: max(1, int(good.sum()) // 1500)]
+        better = fit_swing(moved[some], x[some], y[some], np.full(some.size, 0.1), swing.values)
+        if better is None or better.rms_px > swing.rms_px:
+            odd += len(lost)
+            break
+        t, swing = moved, better
+        placed += len(lost)
+        when += [float(first[k]) for k, _ in lost]
+    if placed:
+        warnings.append(
+            said(
+                "track.lost_frames",
+                "the camera lost or repeated frames at {frames} place(s) that the time stamps do not tell of (t = {places} s): the "
+                "motion leaps there by whole frames; times after them were moved by as much, {share:+.2%} over the clip",
+                frames=placed,
+                places=", ".join(f"{w:.2f}" for w in sorted(when)[:8]),
+                share=float((t[-1] - first[-1]) / (first[-1] - first[0])),
+            )
+        )
+    if odd:
+        warnings.append(
+            said(
+                "track.clock_slips",
+                "the clock of the file slips by whole frames at {places} place(s) (a camera that lost or repeated frames and did "
+                "not say so); the error bars allow for it",
+                places=odd,
+            )
+        )
+    return t, swing
+
+
+def clock_slips(
+    t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, good: np.ndarray
+) -> list[tuple[int, float]]:
+    """The frames from which on the motion is early (+) or late (−) for good, and by how many frames.
 
     Each place is judged by lines through the seven measured frames before and after it, where the bob is fast.
     """
@@ -93,11 +161,11 @@ def clock_slips(t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, goo
     speed = np.hypot(vx, vy) + 1e-9
     step = float(np.median(np.diff(t)))
     ahead = (rx * vx + ry * vy) / speed**2 / step  # in frames
-    slips: list[int] = []
+    slips: list[tuple[int, float]] = []
     chosen = np.flatnonzero(good & (speed > 0.25 * speed.max()))
     n = 7
     if chosen.size < 4 * n:
-        return np.array(slips, int)
+        return slips
     leap, off, bent = np.zeros(chosen.size), np.full(chosen.size, np.inf), np.zeros(chosen.size)
     for i in range(n, chosen.size - n):
         a, b = chosen[i - n : i], chosen[i : i + n]
@@ -110,15 +178,18 @@ def clock_slips(t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, goo
         both = chosen[i - n : i + n]
         smooth = np.polyfit(both - middle, ahead[both], 3)
         bent[i] = np.sqrt(np.mean((ahead[both] - np.polyval(smooth, both - middle)) ** 2))
-    # a leap of a whole frame, far above the scatter, that no bend of the motion explains
-    sharp = (off < 0.06) & (bent > 2.5 * off) & (np.abs(leap - np.round(leap)) < 0.03 + 3 * off)
+    # a leap of about a whole frame, far above the scatter, that no bend of the motion explains
+    sharp = (off < 0.06) & (bent > 2.5 * off) & (np.abs(leap - np.round(leap)) < 0.25)
     while True:
         i = int(np.argmax(np.where(sharp, np.abs(leap), 0)))
         if not sharp[i] or round(float(leap[i])) == 0:
-            break
-        slips.append(int(chosen[i]))
-        sharp[max(0, i - n) : i + n] = False
-    return np.array(sorted(slips), int)
+            return sorted(slips)
+        near = np.arange(max(0, i - n), min(i + n, sharp.size))
+        exact = int(near[np.argmin(np.where(sharp[near], off[near], np.inf))])
+        size, whole = float(leap[exact]), round(float(leap[exact]))
+        # cameras that lose a frame may be late with the next: what is no whole number is taken as it is
+        slips.append((int(chosen[exact]), whole if abs(size - whole) < 0.03 + 3 * off[exact] else size))
+        sharp[near] = False
 
 
 def _running_median(values: np.ndarray, good: np.ndarray, half: int = 7) -> np.ndarray:

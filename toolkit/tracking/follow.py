@@ -152,9 +152,14 @@ class Follower:
             slow = np.argsort(speed)[: max(8, numbers.size // 4)][:16]
             found = [fit(k, look, exposure, calibrate=True, turns=8) for k in slow]
             fits = [f for f in found if f is not None]
+            if look.even and fits and np.nanmedian([f[13] / f[7] for f in fits]) > 1.5:
+                look = look._replace(even=False)  # a pattern or a highlight: the outline alone counts
+                found = [fit(k, look, exposure, calibrate=True, turns=8) for k in slow]
+                fits = [f for f in found if f is not None]
             if len(fits) >= 3:
                 middle = np.median(np.array(fits), axis=0)
-                look = Look(radius or middle[2], max(0.35, middle[3]), middle[9], middle[7])
+                size, edge, contrast, noise = (float(middle[n]) for n in (2, 3, 9, 7))
+                look = Look(radius or size, max(0.35, edge), contrast, noise, even=look.even)
                 left = np.array([points[numbers[k]][0] < xs_middle for k, f in zip(slow, found) if f is not None])
                 sizes = np.array([f[2] for f in fits])
                 if not radius and 3 <= left.sum() <= left.size - 3:
@@ -186,7 +191,7 @@ class Follower:
         """The localiser asked for; else the disc fit where its model holds; else whichever scatters least about the
         motion. Also learns how large a misfit is ordinary for it."""
         names = [wanted] if wanted else ["disc"]
-        if not wanted and self.look.noise > 0.05 * abs(self.look.contrast) + 2.5:
+        if not wanted and (not self.look.even or self.look.noise > 0.05 * abs(self.look.contrast) + 2.5):
             names.append("edge")
         numbers = list(points)
         vx, vy = (v * self.exposure_s for v in self.swing.velocity(np.array([batch[i].t_s for i in numbers])))

@@ -21,6 +21,7 @@ class Minimum(NamedTuple):
         return float(self.rest @ self.rest)
 
 
+@np.errstate(all="ignore")  # a step too far is told by its cost
 def least_squares(
     rest: Callable[[np.ndarray], np.ndarray],
     start: np.ndarray,

@@ -81,7 +81,7 @@ class Swing:
 
 
 def _place(values: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    direction = theta + values[3]
+    direction = np.where(np.isfinite(theta), theta, np.nan) + values[3]
     return values[0] + values[2] * np.sin(direction), values[1] + values[2] * np.cos(direction)
 
 

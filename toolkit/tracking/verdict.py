@@ -69,7 +69,7 @@ def poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, rms_px: float, si
                 share=float(np.expm1(growth)),
             )
         )
-    if rms_px > max(0.15, 3 * sigma_px):
+    if rms_px > max(0.1, 3 * sigma_px):
         poor.append(
             said(
                 "track.strays",

@@ -34,6 +34,7 @@ _PRIOR = {
 }  # fmt: skip
 _GROUPS = {"tilt": ("yaw", "pitch"), "lens": ("k1",), "sway": ("sway_sin", "sway_cos"), "readout": ("readout",)}
 _UNITS = {"k1": "", "readout": "_s"}
+_TILTS = ((0.1, 0.05), (-0.1, 0.05), (0.1, -0.05), (-0.1, -0.05))  # mirrored views are minima of their own
 _SQUARE = (*SWING_NAMES, "factor")
 _GEOMETRY = tuple(_AT[n] for n in NAMES if n not in SWING_NAMES[4:] and n != "factor")
 _MOST = 400  # positions that are enough to see what the camera did
@@ -161,6 +162,12 @@ class View:
                 both.append(self._angles(moved, t, x, y)[0])
             bend = 0.5 * (both[0] + both[1]) - theta
             total += float(np.linalg.lstsq(design, bend, rcond=None)[0][1]) ** 2
+        if "sway" in self.shown:
+            # how much of the depth is yaw, and how much a swing before and behind the plane, is a matter of words
+            phase = np.arctan2(self.values[7] * np.sqrt(abs(self.values[4])), self.values[8])
+            in_phase = self["sway_sin"] * np.cos(phase) + self["sway_cos"] * np.sin(phase)
+            turn = abs(self["yaw"]) + abs(in_phase) / max(float(np.abs(theta).max()), 1e-3)
+            total += (0.5 * turn**2) ** 2
         return float(np.sqrt(total))
 
     # --- the model ------------------------------------------------------------------------------------------------
@@ -252,48 +259,39 @@ def fit_view(
     square = problem.solve(view.values, _SQUARE, 25)
     if square is None:
         return None
-    full_names = (*NAMES,)
-    full: Minimum | None = None
     problem.trim(square.values)
-    for yaw, pitch in ((0.0, 0.0), (0.2, 0.1), (-0.2, 0.1), (0.2, -0.1), (-0.2, -0.1)):
-        trial = square.values.copy()
-        trial[[_AT["yaw"], _AT["pitch"]]] = yaw, pitch
-        found = problem.solve(trial, full_names, 8)
-        if found is not None and (full is None or found.chi2 < 0.98 * full.chi2):
-            full = found
-        if full is not None and yaw == 0 and problem.reduced(full) < 1.3:
-            break
+    chosen = problem.solve(square.values, _SQUARE, 8) or square
+    shown: tuple[str, ...] = ()
+    full = problem.solve(chosen.values, NAMES, 8)
     if full is None:
         return None
-    problem.trim(full.values)
-    full = problem.solve(full.values, full_names, 20)
-    square = problem.solve(square.values, _SQUARE, 12)
-    if full is None or square is None:
-        return None
-    inflation = problem.inflation(full)
     # from the simplest on, effects are added while one explains much of what is left
-    chosen = square
-    shown: tuple[str, ...] = ()
-    while len(shown) < len(_GROUPS) and (chosen.chi2 - full.chi2) / inflation**2 > _CLEAR:
-        best: Minimum | None = None
+    while len(shown) < len(_GROUPS):
+        inflation = problem.inflation(full)
+        if (chosen.chi2 - full.chi2) / inflation**2 < _CLEAR and problem.inflation(chosen) < 1.5 * inflation:
+            break
+        best, winner = chosen, ""
         for group in _GROUPS:
             if group in shown:
                 continue
-            names = _names((*shown, group))
-            trial = chosen.values.copy()
-            for name in _GROUPS[group]:
-                trial[_AT[name]] = full.values[_AT[name]]
-            found = problem.solve(trial, names, 12)
-            if found is not None and (best is None or found.chi2 < best.chi2):
-                best, winner = found, group
-        if best is None or (chosen.chi2 - best.chi2) / inflation**2 < min(_CLEAR, 16.0):
+            for start_at in _TILTS if group == "tilt" else ((0.0, 0.0),):
+                trial = chosen.values.copy()
+                if group == "tilt":
+                    trial[[_AT["yaw"], _AT["pitch"]]] = start_at
+                found = problem.solve(trial, _names((*shown, group)), 8)
+                if found is not None and found.chi2 < best.chi2:
+                    best, winner = found, group
+        inflation = min(inflation, problem.inflation(best))
+        if not winner or (chosen.chi2 - best.chi2) / inflation**2 < _CLEAR:
             break
-        chosen, shown = best, (*shown, winner)
-    if (chosen.chi2 - full.chi2) / inflation**2 > _CLEAR:
-        chosen, shown = full, tuple(_GROUPS)
+        shown = (*shown, winner)
+        problem.trim(best.values)
+        chosen = problem.solve(best.values, _names(shown), 12) or best
+        full = problem.solve(chosen.values, NAMES, 12) or full
+    inflation = problem.inflation(full)
     try:
-        covariance = _spread(np.linalg.inv(full.normal), full_names) * inflation**2
-        square_covariance = _spread(np.linalg.inv(chosen.normal), _names(shown)) * inflation**2
+        covariance = problem.covariance(full, NAMES, inflation)
+        square_covariance = problem.covariance(chosen, _names(shown), inflation)
     except np.linalg.LinAlgError:
         return None
     return View(
@@ -315,13 +313,6 @@ def _names(shown: tuple[str, ...]) -> tuple[str, ...]:
     if "tilt" in shown or "sway" in shown:
         more.append("log_nearness")
     return tuple(name for name in NAMES if name in _SQUARE or name in more)
-
-
-def _spread(small: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    index = [_AT[name] for name in names]
-    whole = np.zeros((len(NAMES), len(NAMES)))
-    whole[np.ix_(index, index)] = small
-    return whole
 
 
 class _Problem:
@@ -398,16 +389,25 @@ class _Problem:
             spread = max(1.0, 1.4826 * float(np.median(np.abs(rest))))
             self.line_weight = np.where(np.abs(rest) < 4 * spread, 1 / spread, 0.0)
 
-    def reduced(self, least: Minimum) -> float:
-        """Reduced χ² of the positions."""
-        return float(np.mean(least.rest[: 2 * self.t.size] ** 2))
+    def covariance(self, least: Minimum, names: tuple[str, ...], inflation: float) -> np.ndarray:
+        """Of all parameters, zero where held: the data's weight lowered by the inflation, the priors' not."""
+        prior = np.array([_PRIOR[name][1] ** -2 if name in _PRIOR else 0.0 for name in names])
+        normal = (least.normal - np.diag(prior)) / inflation**2 + np.diag(prior)
+        index = [_AT[name] for name in names]
+        whole = np.zeros((len(NAMES), len(NAMES)))
+        whole[np.ix_(index, index)] = np.linalg.inv(normal)
+        return whole
 
     def inflation(self, least: Minimum) -> float:
-        """How far the residuals exceed their σ, with their correlation from frame to frame: at least 1."""
+        """How far the residuals exceed their σ, with their correlation from frame to frame.
+
+        At least as if half of σ were no scatter but a bent error that returns with the place (a shadow's, a shading's),
+        such as a handful of points along the arc would have.
+        """
         n = self.t.size
         block = max(2, min(20, n // 12))
         whole = n // block * block
-        found = 1.0
+        found = 1.0 + 0.25 * n / 5
         for r in (least.rest[:n], least.rest[n : 2 * n]):
             sums = r[:whole].reshape(-1, block).sum(axis=1)
             found = max(found, float(np.mean(r**2)), float(np.mean(sums**2)) / block)
