@@ -17,6 +17,8 @@ import math
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +61,22 @@ def main() -> None:
         published(chosen.folder or Path("../shared/data"))
 
 
+def independent(truth: dict[str, float], t: np.ndarray) -> np.ndarray:
+    """θ(t) by SciPy's DOP853 at 1e-12: a truth that none of our own solvers made."""
+    from scipy.integrate import solve_ivp
+
+    w2, alpha, beta = truth["omega_g"] ** 2, truth["alpha_d"], truth.get("beta", 0.0)
+    kappa, sine, cosine = math.sin(truth["theta0"] / 2), math.sin(truth["phi"]), math.cos(truth["phi"])
+
+    def slope(_: float, y: Any) -> tuple[float, float]:
+        theta, omega = y
+        return omega, -w2 * math.sin(theta) - (2 * alpha + beta * abs(omega)) * omega
+
+    begin = [2 * math.asin(kappa * sine), 2 * kappa * truth["omega_g"] * cosine]
+    solved = solve_ivp(slope, (0.0, float(t[-1])), begin, "DOP853", t, rtol=1e-12, atol=1e-13)
+    return np.asarray(solved.y[0])
+
+
 def truth_of(rng: np.random.Generator) -> dict[str, float]:
     """A random scene with linear drag."""
     return {
@@ -79,7 +97,7 @@ def noise_of(rng: np.random.Generator, n: int, sigma: float, rho: float) -> np.n
 
 
 def coverage(count: int) -> None:
-    """Pulls of the full linear model on its own records."""
+    """Pulls of the full linear model on records that SciPy solved."""
     for kind in ("white", "AR(1), rho up to 0.95", "angle scale, u = 1 %"):
         rng = np.random.default_rng(11)
         pulls: dict[str, list[float]] = {name: [] for name in NAMES}
@@ -90,7 +108,7 @@ def coverage(count: int) -> None:
             sigma = float(np.exp(rng.uniform(math.log(3e-4), math.log(3e-3))))
             rho = rng.uniform(0.2, 0.95) if kind.startswith("AR") else 0.0
             scale = 1 + (0.01 * rng.normal() if kind.startswith("angle") else 0.0)
-            theta = load_model("full_linear_drag").motion(truth, t).theta * scale
+            theta = independent(truth, t) * scale
             meta = {"angle_scale_relative_u": 0.01} if kind.startswith("angle") else {}
             series = ThetaSeries(t, theta + noise_of(rng, t.size, sigma, rho), np.full(t.size, sigma), meta)
             result = fit(series, model="full_linear_drag")
@@ -200,45 +218,81 @@ def lost(exact: ThetaSeries, model: str, truth: dict[str, float]) -> float:
     return fit(exact, model=model, thorough=False, start={"theta0": truth["theta0"]}).chi2
 
 
-def worked() -> None:
-    """Linear small-angle fits, ℓ and g held, of a 0.25 kg bob on 0.5 m with b = 6e-5, c = 3.3e-4 (20 s, 60 fps, 1 mrad)."""
+WORKED = {  # amplitude: k_d, its standard error, φ − 90°, χ²/dof, Durbin–Watson, runs z
+    0.05: "7.9e-5 7e-5 -0.009 1.01 2.04 0.2",
+    0.1: "1.14e-4 3.5e-5 -0.027 2.25 0.87 -12",
+    0.2: "1.51e-4 1.8e-5 -0.110 80 0.031 -29",
+    0.3: "2.29e-4 1.2e-5 -0.246 889 0.008 -32",
+    0.5: "5.61e-4 0.8e-5 -0.685 17914 0.005 -33",
+}
+"""Small-angle fits of a real swing as they were worked out once, by other code and with other noise."""
+
+
+def worked(seeds: int = 20) -> None:
+    """Linear small-angle fits, ℓ and g held, of a 0.25 kg bob on 0.5 m with b = 6e-5, c = 3.3e-4 (20 s, 60 fps, 1 mrad).
+
+    Each number is the mean over `seeds` draws of noise ± their scatter, beside the worked one and how many scatters it is
+    away, what its last digit leaves open granted. The motion is SciPy's.
+    """
     m, length = 0.25, 0.5
     scene = Scene(pendulum=Pendulum(m, length))
     omega = math.sqrt(9.80665 / length)
     truth = {"omega_g": omega, "alpha_d": 6e-5 / (2 * m), "beta": 3.3e-4 * length / m, "phi": math.pi / 2}
-    t = np.arange(1201) / 60
-    table = {0.05: 1.01, 0.1: 2.25, 0.2: 80, 0.3: 889, 0.5: 17914}
-    print(
-        f"{'A':>6s}{'k_d fit':>12s}{'±':>10s}{'phi − 90°':>11s}{'χ²/dof':>10s}{'(table)':>10s}{'DW':>8s}{'runs z':>8s}"
-    )
-    for amplitude, printed in table.items():
-        theta = load_model("full_linear_quadratic_drag").motion({**truth, "theta0": amplitude}, t).theta
-        series = ThetaSeries(t, theta + 1e-3 * np.random.default_rng(3).normal(size=t.size), np.full(t.size, 1e-3))
-        r = fit(series, scene, "small_angle_linear_drag", fixed={"theta_offset": 0.0})
-        k_d = r.parameters["k_d"]
-        plain = (k_d.stderr or 0.0) / r.noise["inflation"]
-        print(
-            f"{amplitude:6.2f}{k_d.value:12.3g}{plain:10.1g}{r.parameters['phi'].value - math.pi / 2:11.3f}{r.reduced_chi2:10.2f}"
-            f"{printed:10.5g}{r.noise['durbin_watson']:8.3f}{r.noise['runs_z']:8.1f}"
-        )
-    t = np.arange(1801) / 30
-    theta = load_model("full_linear_quadratic_drag").motion({**truth, "theta0": 0.3}, t).theta
-    series = ThetaSeries(t, theta + 2e-3 * np.random.default_rng(3).normal(size=t.size), np.full(t.size, 2e-3))
-    fits = {n: fit(series, scene, n) for n in ("full_linear_drag", "full_quadratic_drag", "full_linear_quadratic_drag")}
-    both = fits["full_linear_quadratic_drag"]
-    i, j = both.free.index("k_d"), both.free.index("c")
-    correlation = both.covariance[i, j] / math.sqrt(both.covariance[i, i] * both.covariance[j, j])
-    print(
-        "full sine, A = 0.3, 60 s, 30 fps, 2 mrad: χ²/dof", *(f"{r.reduced_chi2:.3f}" for r in fits.values()), end="; "
-    )
-    print(
-        f"ΔAIC(lin − quad) = {fits['full_linear_drag'].aic - fits['full_quadratic_drag'].aic:.1f}; corr(b, c) = {correlation:.3f}"
-    )
-    free = fit(series, model="small_angle_linear_drag")
-    low = 1 - free.parameters["omega_g"].value ** 2 / omega**2
-    print(
-        f"small angle with ω_g free: ω_g² lower by {100 * low:.2f} %, χ²/dof {free.reduced_chi2:.2f}, DW {free.noise['durbin_watson']:.2f}"
-    )
+
+    def noisy(amplitude: float, t: np.ndarray, sigma: float, seed: int) -> ThetaSeries:
+        theta = exact.setdefault((amplitude, t.size), independent({**truth, "theta0": amplitude}, t))
+        noise = sigma * np.random.default_rng(seed).normal(size=t.size)
+        return ThetaSeries(t, theta + noise, np.full(t.size, sigma))
+
+    exact: dict[tuple[float, int], np.ndarray] = {}
+    held = {"theta_offset": 0.0}
+    print(f"mean of {seeds} draws of noise ± scatter | worked (scatters away)")
+    t = np.arange(1200) / 60
+    for amplitude, row in WORKED.items():
+        runs = []
+        for seed in range(seeds):
+            r = fit(noisy(amplitude, t, 1e-3, seed), scene, "small_angle_linear_drag", fixed=held)
+            i = r.free.index("k_d")
+            plain = math.sqrt(r.problem.normal_inverse(r)[i, i])  # as for white noise
+            phi = r.parameters["phi"].value - math.pi / 2
+            runs.append(
+                (r.parameters["k_d"].value, plain, phi, r.reduced_chi2, r.noise["durbin_watson"], r.noise["runs_z"])
+            )
+        print(f"A = {amplitude}")
+        _beside(("k_d", "its u", "phi − 90°", "χ²/dof", "Durbin–Watson", "runs z"), runs, row)
+    t = np.arange(1800) / 30
+    names = ("full_linear_drag", "full_quadratic_drag", "full_linear_quadratic_drag")
+    runs, free = [], []
+    for seed in range(seeds):
+        series = noisy(0.3, t, 2e-3, seed)
+        lin, quad, both = (fit(series, scene, n) for n in names)
+        i, j = both.free.index("k_d"), both.free.index("c")
+        correlation = both.covariance[i, j] / math.sqrt(both.covariance[i, i] * both.covariance[j, j])
+        runs.append((lin.reduced_chi2, quad.reduced_chi2, both.reduced_chi2, lin.aic - quad.aic, correlation))
+        row = []
+        for phase in ({}, {"phi": math.pi / 2}):
+            r = fit(series, model="small_angle_linear_drag", fixed={**held, **phase})
+            row += [100 * (1 - r.parameters["omega_g"].value ** 2 / omega**2), r.reduced_chi2, r.noise["durbin_watson"]]
+        free.append(row)
+    print("full sine, A = 0.3, 60 s, 30 fps, 2 mrad")
+    _beside(("χ²/dof linear", "quadratic", "both", "ΔAIC", "corr(k_d, c)"), runs, "0.978 0.978 0.978 0.3 -1.000")
+    columns = ("ω_g² lower by %", "χ²/dof", "Durbin–Watson")
+    print("small angle with ω_g free and φ held at the release from rest (the worked row)")
+    _beside(columns, [row[3:] for row in free], "1.10 1.22 1.56")
+    print("small angle with ω_g and φ free: more is hidden")
+    _beside(columns, [row[:3] for row in free])
+
+
+def _beside(names: Sequence[str], runs: list[Any], worked: str = "") -> None:
+    mean, scatter = np.mean(runs, axis=0), np.std(runs, axis=0, ddof=1)
+    told = worked.split() or [""] * len(names)
+    for name, at, width, text in zip(names, mean, scatter, told):
+        line = f"    {name:16s}{at:12.4g} ± {width:<8.1g}"
+        if text:
+            rounded = 0.5 * 10.0 ** int(Decimal(text).as_tuple().exponent)  # what its last digit leaves open
+            away = max(abs(float(text) - at) - rounded, 0.0) / max(width, 1e-12)
+            line += f" | {text:>10s} ({away:.1f})"
+        print(line)
 
 
 def starts(count: int) -> None:
