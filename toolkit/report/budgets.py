@@ -20,6 +20,7 @@ _G_HALF_WIDTH = 0.026
 
 _BY_CLOCK = {
     "T0": 1.0,
+    "g_from_length": -2.0,
     "equivalent_length": 2.0,
     "k_d": -1.0,
     "alpha_d": -1.0,
@@ -32,10 +33,10 @@ _BY_CLOCK = {
 
 
 def budget_section(material: Material) -> Section | None:
-    """A GUM budget of the first drag coefficient, of T₀ and of the equivalent length, with what the fit cannot know."""
+    """GUM budgets of the drag coefficients, of T₀, of the length and of g, as far as they were found."""
     words, result = material.words, material.full_sine if material.full_sine.success else material.best
-    names = [n for n in DRAGS if (p := parameter(result, n)) is not None and p.stderr and p.value > p.stderr][:1]
-    names += [n for n in ("T0", "equivalent_length") if parameter(result, n) is not None]
+    names = [n for n in DRAGS if (p := parameter(result, n)) is not None and p.stderr and p.value > p.stderr]
+    names += [n for n in ("T0", "equivalent_length", "g_from_length") if parameter(result, n) is not None]
     tables = [table for name in names if (table := _table(material, result, name)) is not None]
     if not tables:
         return None

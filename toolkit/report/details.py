@@ -86,10 +86,11 @@ def _value(found: Any) -> str:
 
 def motion(material: Material) -> Section | None:
     """Angle, velocity, tension and energy with the model."""
+    from toolkit.report.figures.energy import energy
     from toolkit.report.figures.motion import motion
     from toolkit.report.figures.portrait import portrait
 
-    return _pictures(material, "motion", (motion, portrait))
+    return _pictures(material, "motion", (motion, energy, portrait))
 
 
 def residuals(material: Material) -> Section | None:

@@ -42,8 +42,12 @@ def facts(material: Material) -> tuple[Fact, ...]:
     if not best.success:
         return (Fact(words("question.drag"), words("answer.failed"), say(words, best.message)),)
     remark = words("answer.model", model=model_name(words, best.model))
+    drags = [name for name in DRAGS if name in best.parameters]
+    if len(drags) > 1:
+        parts = (words(f"law.{n}", symbol=symbol(words, n)) for n in drags)
+        remark = f"{', '.join(parts)}; {remark}"
     if "alpha_d" in best.parameters:
-        remark += f"; {words('answer.no_mass')}"
+        remark += f"; {_without_mass(words, best)}"
     found = [Fact(words("question.drag"), drag_answer(material, best), remark)]
     found.append(Fact(words("question.sure"), _sure(material, best), _inflation(words, best)))
     paper = material.paper
@@ -73,6 +77,13 @@ def facts(material: Material) -> tuple[Fact, ...]:
     if gravity is not None:
         found.append(Fact(words("question.g"), f"g = {with_uncertainty(gravity.value, gravity.stderr, 'm/s²')}"))
     return tuple(found)
+
+
+def _without_mass(words: Words, result: FitResult) -> str:
+    """How k_d follows from α_d once the bob is weighed."""
+    found = result.parameters["alpha_d"]
+    per_gram = with_uncertainty(2e-3 * found.value, 2e-3 * found.stderr if found.stderr else None, "kg/s")
+    return words("answer.no_mass", per_gram=per_gram)
 
 
 def _mean_period(material: Material, small_s: float) -> str:

@@ -110,9 +110,12 @@ def _text(text: str) -> str:
         "sub": r"\ensuremath{{_{{\mathrm{{{}}}}}}}",
         "sup": r"\ensuremath{{^{{\mathrm{{{}}}}}}}",
         "bold": r"\textbf{{{}}}",
+        "code": r"\texttt{{{}}}",
     }
     out = []
     for style, part in rich(text):
         plain = "".join(_SPECIAL.get(c, c) for c in part)
+        if style == "code":
+            plain = plain.replace("-", "{-}")  # or two make a dash
         out.append(marks[style].format(plain) if style in marks else plain)
     return "".join(out)

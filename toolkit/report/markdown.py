@@ -60,6 +60,6 @@ def _text(text: str) -> str:
     out = []
     for style, part in rich(text):
         plain = part.replace("&", "&amp;").replace("<", "&lt;").replace("*", "\\*")
-        tag = {"sub": "<sub>{}</sub>", "sup": "<sup>{}</sup>", "bold": "**{}**"}.get(style, "{}")
+        tag = {"sub": "<sub>{}</sub>", "sup": "<sup>{}</sup>", "bold": "**{}**", "code": "`{}`"}.get(style, "{}")
         out.append(tag.format(plain))
     return "".join(out)

@@ -24,15 +24,17 @@ DRAGS = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
 
 @dataclass(frozen=True)
 class Curve:
-    """A model on a dense grid: θ, θ̇, tension over weight, and the standard uncertainty of each from the fit."""
+    """A model on a dense grid: θ, θ̇, tension over weight, energy over m g ℓ, and each one's standard uncertainty."""
 
     t_s: np.ndarray
     theta_rad: np.ndarray
     omega_rad_per_s: np.ndarray
     tension: np.ndarray
+    energy: np.ndarray
     theta_u: np.ndarray | None
     omega_u: np.ndarray | None
     tension_u: np.ndarray | None
+    energy_u: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -128,12 +130,14 @@ class Material:
         if problem is None:
             at = np.clip(np.searchsorted(self.t, t_s), 0, self.t.size - 1)
             theta, omega = result.theta_rad[at], result.omega_rad_per_s[at]
-            return Curve(self.t[at], theta, omega, self._tension(theta, omega), None, None, None)
+            tension, energy = self._tension(theta, omega), self._energy(theta, omega)
+            return Curve(self.t[at], theta, omega, tension, energy, None, None, None, None)
         names = tuple(result.free)
         motion = problem.motion(values, t_s - problem.shift_s, names)
         scale = 1 + values.get("angle_scale", 0.0)
         d_theta, d_omega = motion.d_theta.copy(), motion.d_omega
         d_tension = -np.sin(motion.theta)[:, None] * d_theta + 2 * (motion.omega / self.omega_g**2)[:, None] * d_omega
+        d_energy = np.sin(motion.theta)[:, None] * d_theta + (motion.omega / self.omega_g**2)[:, None] * d_omega
         if "theta_offset" in names:
             d_theta[:, names.index("theta_offset")] += 1.0
         covariance = np.asarray(result.covariance, dtype=float)
@@ -143,12 +147,25 @@ class Material:
             return np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", by, covariance, by), 0)) if known else None
 
         theta = scale * motion.theta + values.get("theta_offset", 0.0)
-        tension = self._tension(motion.theta, motion.omega)
-        return Curve(t_s, theta, motion.omega, tension, band(d_theta), band(d_omega), band(d_tension))
+        tension, energy = self._tension(motion.theta, motion.omega), self._energy(motion.theta, motion.omega)
+        bands = (band(by) for by in (d_theta, d_omega, d_tension, d_energy))
+        return Curve(t_s, theta, motion.omega, tension, energy, *bands)
 
     def _tension(self, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Tension of the string over the bob's weight: cos θ + θ̇²/ω_g²."""
         return np.cos(theta) + (omega / self.omega_g) ** 2
+
+    def _energy(self, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
+        """Energy over m g ℓ: θ̇²/(2 ω_g²) + 1 − cos θ."""
+        return (omega / self.omega_g) ** 2 / 2 + 1 - np.cos(theta)
+
+    @cached_property
+    def reduced(self) -> dict[str, float]:
+        """α_d, β, μ and ω_g of the preferred model; empty where it was fitted otherwise."""
+        problem = self.problem(self.best)
+        if problem is None:
+            return {}
+        return dict(problem.reduce({name: p.value for name, p in self.best.parameters.items()})[0])
 
     @cached_property
     def measured_omega(self) -> np.ndarray:

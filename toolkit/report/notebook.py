@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from toolkit.fit import FitResult
     from toolkit.series import ThetaSeries
 
-_TAGS = {"sub": "sub", "sup": "sup", "bold": "strong"}
+_TAGS = {"sub": "sub", "sup": "sup", "bold": "strong", "code": "code"}
 _TONES = {"fails": "#b34700", "holds": "#00704f"}
 
 

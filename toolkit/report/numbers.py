@@ -1,6 +1,7 @@
 """Numbers as a lab report writes them: the uncertainty to two digits, the value to the same place (JCGM 100, 7.2.6).
 
-Texts carry light marks that each writer turns into its own: `_{below}`, `^{above}` and `**bold**`.
+Texts carry light marks that each writer turns into its own: `_{below}`, `^{above}` and `**bold**`; an option of the
+command (`--start`) is set as code.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import re
 from decimal import ROUND_HALF_EVEN, Decimal
 
 _MINUS = "−"
-_MARK = re.compile(r"_\{([^{}]*)\}|\^\{([^{}]*)\}|\*\*(.+?)\*\*")
+_MARK = re.compile(r"_\{([^{}]*)\}|\^\{([^{}]*)\}|\*\*(.+?)\*\*|(--[a-z][a-z-]+)")
 
 
 def rounded(value: float, u: float) -> tuple[str, str]:
@@ -107,19 +108,21 @@ def unit_text(unit: str) -> str:
 
 
 def rich(text: str) -> list[tuple[str, str]]:
-    """[(style, text)] with style `plain`, `sub`, `sup` or `bold`."""
+    """[(style, text)] with style `plain`, `sub`, `sup`, `bold` or `code`."""
     parts: list[tuple[str, str]] = []
     end = 0
     for found in _MARK.finditer(text):
         if found.start() > end:
             parts.append(("plain", text[end : found.start()]))
-        below, above, bold = found.groups()
+        below, above, bold, code = found.groups()
         if below is not None:
             parts.append(("sub", below))
         elif above is not None:
             parts.append(("sup", above))
-        else:
+        elif bold is not None:
             parts.append(("bold", bold))
+        else:
+            parts.append(("code", code))
         end = found.end()
     if end < len(text):
         parts.append(("plain", text[end:]))

@@ -14,7 +14,7 @@ from toolkit.report.html import numbering
 from toolkit.report.numbers import bare, rich
 
 _LINE_MM, _TALLEST_MM = 174, 105
-_SMALL = {"portrait": 62, "frame": 78}
+_SMALL = {"portrait": 50, "frame": 78}
 
 
 def write(report: Report, folder: Path) -> Path:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from toolkit.report.document import Figure
 from toolkit.report.material import DRAGS, Material
-from toolkit.report.numbers import bare
 from toolkit.report.style import BEST_MODEL, INK, draw, panels
 
 
@@ -31,21 +31,23 @@ def contours(material: Material) -> Figure | None:
     correlation = covariance / np.outer(sigma, sigma)
     first, second = _pair(result.free, correlation)
     labels = [_label(words, name) for name in result.free]
-    values = np.array([result.parameters[name].value for name in result.free])
-    units = [result.parameters[name].unit for name in result.free]
+    parameters = [result.parameters[name] for name in result.free]
+    powers = [_power(p.value, u) for p, u in zip(parameters, sigma)]
+    values = np.array([p.value / 10.0**power for p, power in zip(parameters, powers)])
+    units = [_unit(p.unit, power) for p, power in zip(parameters, powers)]
+    scaled = covariance / np.outer(10.0 ** np.array(powers), 10.0 ** np.array(powers))
 
     def paint(figure: Any) -> None:
         left, right = panels(figure, 1, 2, left=0.85, gap=0.8, bottom=0.62, width_ratios=(1.15, 1))
         turn = np.linspace(0, 2 * np.pi, 181)
-        root = np.linalg.cholesky(covariance[np.ix_([first, second], [first, second])] + 0.0)
+        root = np.linalg.cholesky(scaled[np.ix_([first, second], [first, second])])
         for k, alpha in ((2, 0.18), (1, 0.35)):
             x, y = k * root @ np.vstack([np.cos(turn), np.sin(turn)])
             left.fill(values[first] + x, values[second] + y, color=BEST_MODEL, alpha=alpha, linewidth=0)
         left.plot(values[first], values[second], "+", color=INK, markersize=6)
-        for axis, k in ((left.set_xlabel, first), (left.set_ylabel, second)):
-            axis(f"{labels[k]} ({_unit(units[k])})" if _unit(units[k]) else labels[k])
+        left.set_xlabel(f"{labels[first]} {units[first]}")
+        left.set_ylabel(f"{labels[second]} {units[second]}")
         left.ticklabel_format(useOffset=False)
-        left.locator_params(nbins=5)
         right.grid(False)
         right.imshow(np.abs(correlation), cmap="Greys", vmin=0, vmax=1.6, aspect="auto")
         for i in range(len(labels)):
@@ -63,7 +65,7 @@ def contours(material: Material) -> Figure | None:
         **{f"correlation_{n}": correlation[i] for i, n in enumerate(result.free)},
     }
     model = words.either(f"model.{result.model}", result.model)
-    return Figure("contours", words("caption.contours", model=model), draw("contours", words.lang, 2.7, paint), data)
+    return Figure("contours", words("caption.contours", model=model), draw("contours", "en", 2.7, paint), data)
 
 
 def _covariance(result: Any) -> np.ndarray | None:
@@ -83,8 +85,18 @@ def _pair(names: tuple[str, ...], correlation: np.ndarray) -> tuple[int, int]:
 
 
 def _label(words: Any, name: str) -> str:
-    return bare(words.either(f"symbol.{name}", name)).replace("_0", "₀")
+    """The symbol as mathtext: symbols hold no Thai."""
+    return "$" + words.either(f"symbol.{name}", name).replace("_{offset}", r"_\mathrm{offset}") + "$"
 
 
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else unit.replace("1/s^2", "1/s²")
+def _power(value: float, u: float) -> int:
+    """The power of ten that stands with the unit, so that the ticks are plain numbers."""
+    size = max(abs(value), u)
+    power = math.floor(math.log10(size)) if size > 0 else 0
+    return power if power < -2 or power > 3 else 0
+
+
+def _unit(unit: str, power: int) -> str:
+    shown = {"1": "", "1/s^2": "1/s²", "N·m": "N m"}.get(unit, unit)
+    factor = f"$10^{{{power}}}$" if power else ""
+    return f"({' '.join(part for part in (factor, shown) if part)})" if factor or shown else ""

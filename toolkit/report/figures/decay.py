@@ -14,7 +14,7 @@ from toolkit.report.style import BEST_MODEL, DATA, PAPER_MODEL, dots, draw, pane
 _LAWS = (("full_linear_drag", "linear", PAPER_MODEL, "-"), ("full_quadratic_drag", "quadratic", BEST_MODEL, "--"))
 
 
-def decay(material: Material, width_in: float = 3.35, height_in: float = 2.5) -> Figure | None:
+def decay(material: Material, width_in: float = 3.35, height_in: float = 2.85) -> Figure | None:
     """Amplitude of each swing against time on a logarithmic axis, and what each law leaves of it below."""
     cycles = material.cycles
     if cycles is None:
@@ -28,15 +28,17 @@ def decay(material: Material, width_in: float = 3.35, height_in: float = 2.5) ->
     degrees = np.degrees(cycles.amplitude_rad)
 
     def paint(figure: Any) -> None:
-        top, rest = panels(figure, 2, sharex=True, height_ratios=(2, 1)) if laws else (panels(figure), None)
+        top, rest = panels(figure, 2, sharex=True, height_ratios=(2.2, 1)) if laws else (panels(figure), None)
         dots(top, cycles.t_s, degrees, DATA, 2.2 if degrees.size > 60 else 4.0, 1.0, words("figure.measured"))
         for name, (law, colour, dash) in laws.items():
             top.plot(cycles.t_s, np.degrees(law), dash, color=colour, label=words(f"figure.law_{name}"))
         top.set_ylabel(words("figure.amplitude_deg"))
         if degrees.max() > 1.6 * degrees.min():
             top.set_yscale("log")
-            _plain_log(top)
-        top.legend(loc="upper right")
+            plain_log(top)
+        low, high = np.log(degrees.min()), np.log(degrees.max())
+        top.set_ylim(np.exp(low - 0.06 * (high - low)), np.exp(high + 0.45 * (high - low)))  # room for the legend
+        top.legend(loc="upper right", borderaxespad=0, labelspacing=0.25)
         if rest is None:
             top.set_xlabel(words("figure.time_s"))
             return
@@ -45,7 +47,6 @@ def decay(material: Material, width_in: float = 3.35, height_in: float = 2.5) ->
         rest.axhline(0, color=DATA, linewidth=0.6)
         rest.set_ylabel(words("figure.deviation_percent"))
         rest.set_xlabel(words("figure.time_s"))
-        figure.align_ylabels()
 
     data = {"t_s": cycles.t_s, "amplitude_rad": cycles.amplitude_rad}
     data |= {f"{name}_rad": law for name, (law, _, _) in laws.items()}
@@ -61,9 +62,10 @@ def _envelope(material: Material, model: str, cycles: Cycles) -> np.ndarray | No
     return scale * np.interp(cycles.t_s, material.t, amplitude_of(result))
 
 
-def _plain_log(axis: Any) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+def plain_log(axis: Any) -> None:
+    """Ticks 1, 2, 5 as plain numbers on a logarithmic y axis."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axis.yaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    axis.yaxis.set_minor_formatter(NullFormatter())
+    axis.yaxis.set_minor_locator(NullLocator())

@@ -66,7 +66,6 @@ def motion(material: Material) -> Figure | None:
             axes[row, 0].set_ylabel(label)
         for axis in axes[-1]:
             axis.set_xlabel(words("figure.time_s"))
-        figure.align_ylabels()
 
     data = {
         "t_s": t,
@@ -78,7 +77,7 @@ def motion(material: Material) -> Figure | None:
     return Figure(
         "motion",
         words("caption.motion" if whole else "caption.motion_short"),
-        draw("motion", words.lang, 4.5, paint),
+        draw("motion", words.lang, 3.7, paint),
         data,
     )
 

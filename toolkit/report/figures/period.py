@@ -12,7 +12,7 @@ from toolkit.report.material import Material, binned, value
 from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, dots, draw, panels
 
 
-def period(material: Material, width_in: float = 3.35, height_in: float = 2.5) -> Figure | None:
+def period(material: Material, width_in: float = 3.35, height_in: float = 2.85) -> Figure | None:
     """Measured period of each swing against its amplitude, the pendulum's own curve, and the small-angle line."""
     cycles = material.cycles
     small = value(material.full_sine, "T0")

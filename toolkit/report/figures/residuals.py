@@ -29,7 +29,7 @@ def residuals(material: Material) -> Figure | None:
     ]
 
     def paint(figure: Any) -> None:
-        axes = panels(figure, len(rows), 4, gap=0.12, between=0.3, top=0.25, sharey="row", sharex="col", squeeze=False)
+        axes = panels(figure, len(rows), 4, gap=0.2, between=0.3, top=0.25, sharey="row", sharex="col", squeeze=False)
         for line, (result, colour, name) in zip(axes, rows):
             rest = 1e3 * result.residuals_rad
             for axis, (x, _) in zip(line, against):
@@ -43,6 +43,7 @@ def residuals(material: Material) -> Figure | None:
             line[0].set_ylim(-limit, limit)
         for axis, (_, label) in zip(axes[-1], against):
             axis.set_xlabel(label)
+            axis.locator_params(axis="x", nbins=4)
 
     data = {"t_s": material.t, "residual_preferred_rad": material.best.residuals_rad}
     if len(rows) > 1 and paper is not None:
