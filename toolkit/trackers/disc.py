@@ -27,8 +27,8 @@ def fit_disc(
     from toolkit.trackers._disc_kernel import fit
 
     out = np.zeros(14)
-    start = np.array((guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften))
-    streak = np.array((guess.streak_x_px, guess.streak_y_px))
+    start = np.array((guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften), float)
+    streak = np.array((guess.streak_x_px, guess.streak_y_px), float)
     string = np.array((0.0, 0.0, 1.0))
     if guess.string_rad == guess.string_rad:
         string[:] = cos(guess.string_rad), sin(guess.string_rad), cos(min(0.9, 0.2 + 3.0 / look.radius_px)) ** 2
