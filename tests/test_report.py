@@ -391,7 +391,7 @@ def test_latex_fragment(english, tmp_path):
     text = path.read_text(encoding="utf-8")
     bare_text = re.sub(r"\\[\\{}]", "", text)
     assert bare_text.count("{") == bare_text.count("}")
-    for name in ("tabularx", "figure", "table", "itemize", "description", "equation"):
+    for name in ("tabular", "figure", "table", "itemize", "description", "equation"):
         assert text.count(f"\\begin{{{name}}}") == text.count(f"\\end{{{name}}}") > 0
     assert not re.search(
         r"(?<!\\)[&%#](?![^\n]*\\\\)", re.sub(r"^%.*$", "", text, flags=re.MULTILINE).replace(" & ", "")
@@ -399,6 +399,33 @@ def test_latex_fragment(english, tmp_path):
     for key in re.findall(r"\\includegraphics\[[^]]*\]\{(figures/\w+)\}", text):
         assert (tmp_path / f"{key}.pdf").read_bytes()[:5] == b"%PDF-"
         assert (tmp_path / f"{key}.csv").stat().st_size > 20
+
+
+@pytest.mark.parametrize("lang", ["en", "th"])
+def test_latex_compiles(english, thai, tmp_path, lang):
+    """As the fragment's own head says, in the smallest document."""
+    import shutil
+    import subprocess
+    from importlib.resources import files
+
+    engine = shutil.which("pdflatex" if lang == "en" else "xelatex")
+    if engine is None:
+        pytest.skip("no TeX on this machine")
+    (path,) = write_report(english if lang == "en" else thai, tmp_path, ("tex",))
+    head = [line[4:] for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("%   ")]
+    fonts = f"{files('toolkit.report') / 'fonts'}/"
+    font = f"\\setmainfont{{NotoSansThai}}[Path={fonts},Extension=.ttf,UprightFont=*-Regular,BoldFont=*-Bold]"
+    document = "\n".join(head).replace("\\setmainfont{Noto Sans Thai}", font)
+    (tmp_path / "document.tex").write_text(document, encoding="utf-8")
+    command = [engine, "-interaction=nonstopmode", "-halt-on-error", "document.tex"]
+    told = subprocess.run(command, cwd=tmp_path, capture_output=True).stdout.decode("utf-8", "replace")
+    if re.search(r"! LaTeX Error: File `\w+\.sty' not found", told):
+        pytest.skip("this TeX lacks a package")
+    assert (tmp_path / "document.pdf").is_file(), told[-800:]
+    log = (tmp_path / "document.log").read_text(encoding="utf-8", errors="replace")
+    assert "Missing character" not in log
+    wide = [float(points) for points in re.findall(r"Overfull \\hbox \(([\d.]+)pt too wide\)", log)]
+    assert max(wide, default=0.0) < 20  # nothing runs out of the margin
 
 
 def test_markdown_and_its_figures(english, tmp_path):

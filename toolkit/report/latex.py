@@ -6,7 +6,8 @@ from pathlib import Path
 
 from toolkit.report.document import Block, Equation, Figure, Report, Table
 from toolkit.report.figure_files import write_figures
-from toolkit.report.numbers import rich
+from toolkit.report.numbers import bare, rich
+from toolkit.report.paper import width_percent
 
 _SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -19,6 +20,9 @@ _SPECIAL = {
     "_": r"\_",
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
+    "<": r"\ensuremath{<}",
+    ">": r"\ensuremath{>}",
+    "|": r"\ensuremath{|}",
     "°": r"\ensuremath{^\circ}",
     "±": r"\ensuremath{\pm}",
     "×": r"\ensuremath{\times}",
@@ -45,8 +49,21 @@ _SPECIAL = {
     "”": "''",
     "θ̇": r"\ensuremath{\dot\theta}",
 }
-_HEAD = r"""% A fragment: \input{report.tex} in a document with \usepackage{graphicx,booktabs,tabularx,amsmath}.
-% Figures are PDF files in figures/, their numbers CSV files of the same name. Thai needs XeLaTeX or LuaLaTeX.
+_SPECIAL |= {raised: rf"\ensuremath{{^{{{plain}}}}}" for raised, plain in zip("⁰¹³⁴⁵⁶⁷⁸⁹⁺⁻", "013456789+-")}
+_RAGGED = r">{\raggedright\arraybackslash}p"
+_HEAD = r"""% A fragment. With pdfLaTeX, XeLaTeX or LuaLaTeX:
+%   \documentclass{article}
+%   \usepackage{graphicx,booktabs,array,amsmath}
+%   \begin{document}\input{report.tex}\end{document}
+% Figures are PDF files in figures/, their numbers CSV files of the same name.
+"""
+_HEAD_THAI = r"""% A fragment in Thai. With XeLaTeX and a Thai font, for example Noto Sans Thai:
+%   \documentclass{article}
+%   \usepackage{graphicx,booktabs,array,amsmath,fontspec}
+%   \setmainfont{Noto Sans Thai}
+%   \XeTeXlinebreaklocale "th"  % lines break between Thai words
+%   \begin{document}\input{report.tex}\end{document}
+% Figures are PDF files in figures/, their numbers CSV files of the same name.
 """
 
 
@@ -61,8 +78,13 @@ def write(report: Report, folder: Path) -> Path:
 def render(report: Report) -> str:
     """The fragment as text."""
     words = report.words
-    parts = [_HEAD, f"\\section*{{{_text(report.title)}: {_text(report.subtitle)}}}", _text(report.lead), ""]
-    parts.append("\\begin{description}")
+    parts = [
+        _HEAD_THAI if words.lang == "th" else _HEAD,
+        f"\\section*{{{_text(report.title)}: {_text(report.subtitle)}}}",
+        _text(report.lead),
+        "",
+    ]
+    parts += [r"\begingroup\sloppy  % numbers with units are long words", "\\begin{description}"]
     for fact in report.facts:
         remark = f" {{\\small {_text(fact.remark)}}}" if fact.remark else ""
         parts.append(f"\\item[{_text(fact.question)}] {_text(fact.answer)}.{remark}")
@@ -75,13 +97,13 @@ def render(report: Report) -> str:
     for section in report.sections:
         parts.append(f"\\subsection*{{{_text(section.title)}}}")
         parts += [_block(block) for block in section.blocks]
-    return "\n".join([*parts, _text(report.footer), ""])
+    return "\n".join([*parts, _text(report.footer), r"\par\endgroup", ""])
 
 
 def _block(block: Block) -> str:
     if isinstance(block, Figure):
-        width = "0.5" if block.key in ("period", "decay") else "0.95"
-        picture = f"\\includegraphics[width={width}\\linewidth]{{figures/{block.key}}}"
+        width = 0.5 if block.key in ("period", "decay") else width_percent(block) / 100
+        picture = f"\\includegraphics[width={width:.2f}\\linewidth]{{figures/{block.key}}}"
         return f"\\begin{{figure}}[htbp]\\centering {picture}\n\\caption{{{_text(block.caption)}}}\\label{{fig:{block.key}}}\\end{{figure}}\n"
     if isinstance(block, Equation):
         return f"\\begin{{equation}}\n{block.latex}\n\\end{{equation}}\n"
@@ -91,18 +113,27 @@ def _block(block: Block) -> str:
             cells = (f"\\textbf{{{_text(cell)}}}" for cell in block.rows[block.mark])
             rows[block.mark] = " & ".join(cells) + r" \\"
         head = " & ".join(_text(cell) for cell in block.header) + r" \\"
-        shape = "l" * (len(block.header) - 1) + "X"
+        shape = "".join(f"{_RAGGED}{{{share:.3f}\\linewidth}}" for share in _shares(block))
         return "\n".join(
             [
-                f"\\begin{{table}}[htbp]\\small\\caption{{{_text(block.caption)}}}\\label{{tab:{block.key}}}",
-                f"\\begin{{tabularx}}{{\\linewidth}}{{{shape}}}\\toprule",
+                f"\\begin{{table}}[htbp]\\footnotesize\\setlength{{\\tabcolsep}}{{3pt}}\\caption{{{_text(block.caption)}}}\\label{{tab:{block.key}}}",
+                f"\\begin{{tabular}}{{{shape}}}\\toprule",
                 head + r"\midrule",
                 *rows,
-                "\\bottomrule\\end{tabularx}\\end{table}\n",
+                "\\bottomrule\\end{tabular}\\end{table}\n",
             ]
         )
     listed = "\n".join(f"\\item {_text(item)}" for item in block.items)
     return _text(block.text) + (f"\n\\begin{{itemize}}\n{listed}\n\\end{{itemize}}" if listed else "") + "\n"
+
+
+def _shares(table: Table) -> list[float]:
+    """Each column's share of the line, by its longest cell, but never narrower than its longest word."""
+    columns = list(zip(table.header, *table.rows))
+    longest = [max(len(bare(cell)) for cell in column) for column in columns]
+    words = [max(len(word) for cell in column for word in bare(cell).split() or [""]) for column in columns]
+    weights = [max(word + 1, min(length, 26)) for word, length in zip(words, longest)]
+    return [(1 - 0.018 * len(columns)) * weight / sum(weights) for weight in weights]
 
 
 def _text(text: str) -> str:

@@ -12,9 +12,7 @@ from typing import Any
 from toolkit.report.document import Block, Equation, Figure, Report, Table
 from toolkit.report.html import numbering
 from toolkit.report.numbers import bare, rich
-
-_LINE_MM, _TALLEST_MM = 174, 105
-_SMALL = {"portrait": 50, "frame": 78}
+from toolkit.report.paper import column_kinds, width_percent
 
 
 def write(report: Report, folder: Path) -> Path:
@@ -52,7 +50,7 @@ def _content(report: Report, root: Path) -> dict[str, Any]:
             "number": numbers[figure.key],
             "caption": rich(figure.caption),
             "alt": bare(figure.caption),
-            "width": _width_percent(figure),
+            "width": width_percent(figure),
         }
 
     def block(item: Block) -> dict[str, Any]:
@@ -67,7 +65,7 @@ def _content(report: Report, root: Path) -> dict[str, Any]:
                 "header": [rich(cell) for cell in item.header],
                 "rows": [[rich(cell) for cell in row] for row in item.rows],
                 "mark": -1 if item.mark is None else item.mark,
-                "columns": _columns(item),
+                "columns": column_kinds(item),
             }
         if isinstance(item, Equation):
             if item.svg:
@@ -110,21 +108,3 @@ def _content(report: Report, root: Path) -> dict[str, Any]:
         "sections": [{"title": s.title, "blocks": [block(b) for b in s.blocks]} for s in report.sections],
         "footer": rich(report.footer),
     }
-
-
-def _width_percent(figure: Figure) -> float:
-    """Share of the line's width: no picture takes more than half a page."""
-    box = re.search(r'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"', figure.svg)
-    tallest = 100.0
-    if box:
-        tallest = 100 * _TALLEST_MM / _LINE_MM * float(box[1]) / float(box[2])
-    return round(min(_SMALL.get(figure.key, 100), tallest), 1)
-
-
-def _columns(table: Table) -> list[str]:
-    """`auto` for short columns, `wide` for those whose cells are long; at least one takes the rest of the line."""
-    longest = [max(len(bare(row[k])) for row in (table.header, *table.rows)) for k in range(len(table.header))]
-    kinds = ["auto" if width <= 28 else "wide" for width in longest]
-    if "wide" not in kinds:
-        kinds[longest.index(max(longest))] = "wide"
-    return kinds

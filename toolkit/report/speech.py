@@ -24,7 +24,8 @@ def say(words: Words, text: str) -> str:
 def say_whole(words: Words, text: str) -> str:
     """`say`, beginning with a capital and ending with the language's full stop."""
     told = say(words, text)
-    told = f"{told[:1].upper()}{told[1:]}"
+    if told[:1].isascii():  # a symbol stays small
+        told = f"{told[:1].upper()}{told[1:]}"
     return told if told.endswith((".", ":", "?")) else words("language.sentence", text=told)
 
 
