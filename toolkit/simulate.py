@@ -70,7 +70,8 @@ def _trajectory(
         tension = energy = np.full(t.shape, np.nan)
         warnings += ("the scene gives no mass: tension and energy are left out",)
     else:
-        tension, energy = equation.tension_and_energy(parameters, t, theta, omega)
+        integrated = solution.cost.steps > 0
+        tension, energy = equation.tension_and_energy(parameters, t, theta, omega, compiled=integrated)
         if t.size and tension.min() < 0:
             first = int(np.argmax(tension < 0))
             warnings += (

@@ -104,7 +104,10 @@ class _Solver:
             for series in (theta, omega)
             for n in (_ORDER - 1, _ORDER)
         ]
-        self.step = int(min(*sizes, 100.0) * _ONE)
+        # a longer step would amplify what decays, however small it has become
+        decay = (self.two_alpha + 2 * _product(self.beta, abs(omega[0]))) / _ONE
+        stable = 4.0 / (1e-3 + decay + (abs(self.gravity) / _ONE) ** 0.5)
+        self.step = int(min(*sizes, stable) * _ONE)
         self.turned = 0
         if self.beta:
             self._stop_at_turning_point(sign)

@@ -94,7 +94,7 @@ def series(module: ModuleType, name: str) -> int:
 
         from toolkit.motion.kernels.pointer import REALS
 
-        return [REALS] * 4 + [types.int64], {"contract", "reassoc", "nsz"}, getattr(module, name)
+        return [REALS] * 4 + [types.int64], {"contract"}, getattr(module, name)
 
     return machine_code(f"{module.__name__}_{name}", source)
 

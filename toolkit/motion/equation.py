@@ -101,13 +101,29 @@ class Equation:
         )
 
     def tension_and_energy(
-        self, parameters: Mapping[str, float], t_s: np.ndarray, theta_rad: np.ndarray, omega_rad_per_s: np.ndarray
+        self,
+        parameters: Mapping[str, float],
+        t_s: np.ndarray,
+        theta_rad: np.ndarray,
+        omega_rad_per_s: np.ndarray,
+        compiled: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Tension (N) and energy (J) along a motion: as `terms_at`, without evaluating what does not enter them."""
+        """Tension (N) and energy (J) along a motion: as `terms_at`, without evaluating what does not enter them.
+
+        compiled : by machine code, where no effect but gravity and inertia enters.
+        """
         values = dict(zip(self.parameters, self.values(parameters)))
         values["mass_kg"] = mass = parameters["mass_kg"]
         length, g = values["length_m"], values["g_m_per_s2"]
         tension, energy = np.empty(t_s.size), np.empty(t_s.size)
+        if compiled and not self._observed and not self.small_angle:
+            from toolkit.motion.compiled import kernel
+
+            numbers = np.array([mass * length, mass * g, mass * g * length, mass * length**2 / 2])
+            arrays = (np.array([t_s.size]), numbers, theta_rad, omega_rad_per_s, tension, energy)
+            places = np.array([array.__array_interface__["data"][0] for array in arrays] + [0])
+            kernel("observe")(places[-1:].ctypes.data, None, places.ctypes.data)
+            return tension, energy
         for part in blocks(t_s.size):
             t, theta, omega = t_s[part], theta_rad[part], omega_rad_per_s[part]
             square = omega * omega

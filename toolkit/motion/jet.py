@@ -25,7 +25,7 @@ def _function(name: str, first: Sequence[str], each: Sequence[str], ends: Sequen
 
 
 class Jet:
-    """Writes jet(q, s, W, R, n): Taylor coefficients 0 … n of θ and w, 0 … n − 1 of F and of the functions in F, F_θ, F_w.
+    """Writes jet(q, s, W, R, n): Taylor coefficients 0 … n of θ and w, 0 … n − 1 of F and of the functions in F, F_θ, F_w, F_τ.
 
     And more(q, s, W, R, n), to be called after it: those of the functions that only the sensitivities need.
     """
@@ -40,7 +40,7 @@ class Jet:
 
     def source(self) -> str:
         """Both functions, and N_WORK, the rows of W that they use. Raises NotAnalytic."""
-        basis, own = self.writer.basis, {column for row in self.writer.matrix[:3] for column in row}
+        basis, own = self.writer.basis, {column for row in self.writer.matrix[:4] for column in row}
         for i in sorted(own):
             self._basis(basis[i], 3 + i)
         at_first, at_each = self.first, self.each
@@ -155,8 +155,10 @@ class Jet:
         if a == b:
             self.each += [
                 "v = 0.0",
-                "for j in range((k + 1) // 2):",
+                "j = (k + 1) // 2 - 1",
+                "while j >= 0:",  # the newest coefficient last
                 f"    v += W[{a * ROW} + j] * W[{a * ROW} + k - j]",
+                "    j -= 1",
                 "v *= 2.0",
                 "if k % 2 == 0:",
                 f"    v += W[{a * ROW} + k // 2] * W[{a * ROW} + k // 2]",
@@ -216,23 +218,30 @@ class Jet:
         else:
             a = self._row(angle)
             self.first.append(f"v = W[{a * ROW}]")
-            # j a_j of the argument's series; for θ itself j θ_j = w_{j−1}. Two sums side by side keep the machine busy.
-            one = f"W[{ROW} + j - 1]" if a == 0 else f"j * W[{a * ROW} + j]"
-            two = f"W[{ROW} + j]" if a == 0 else f"(j + 1) * W[{a * ROW} + j + 1]"
+            # j a_j of the argument's series; for θ itself j θ_j = w_{j−1}. Two sums side by side keep the machine busy,
+            # and the terms with the newest coefficients come last, so that nothing waits for them.
+            term = "W[{} + {} - 1]" if a == 0 else "({1}) * W[{0} + {1}]"
+            base = ROW if a == 0 else a * ROW
+            one, two, left, last = (term.format(base, j) for j in ("j", "j - 1", "2", "1"))
             self.each += [
                 "u, v, u2, v2 = 0.0, 0.0, 0.0, 0.0",
-                "for j in range(1, k, 2):",
+                "j = k",
+                "while j >= 3:",
                 f"    x, y = {one}, {two}",
                 f"    u += x * W[{cosine * ROW} + k - j]",
                 f"    v += x * W[{sine * ROW} + k - j]",
-                f"    u2 += y * W[{cosine * ROW} + k - j - 1]",
-                f"    v2 += y * W[{sine * ROW} + k - j - 1]",
+                f"    u2 += y * W[{cosine * ROW} + k - j + 1]",
+                f"    v2 += y * W[{sine * ROW} + k - j + 1]",
+                "    j -= 2",
                 "u += u2",
                 "v += v2",
-                "if k % 2 == 1:",
-                f"    x = {one.replace('j', 'k')}",
-                f"    u += x * W[{cosine * ROW}]",
-                f"    v += x * W[{sine * ROW}]",
+                "if j == 2:",
+                f"    x = {left}",
+                f"    u += x * W[{cosine * ROW} + k - 2]",
+                f"    v += x * W[{sine * ROW} + k - 2]",
+                f"x = {last}",
+                f"u += x * W[{cosine * ROW} + k - 1]",
+                f"v += x * W[{sine * ROW} + k - 1]",
                 f"W[{sine * ROW} + k] = u * R[k]",
                 f"W[{cosine * ROW} + k] = -v * R[k]",
             ]

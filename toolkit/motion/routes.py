@@ -58,7 +58,7 @@ def taylor() -> Route:
     def work_size(rows: int, k: int) -> int:
         return 6 + BLOCK + ROW * (4 + 2 * (k + 1) + rows)
 
-    return Route("taylor", "Taylor series of order", reciprocals, work_size, 0, 0.1, 1e-17)
+    return Route("taylor", "Taylor series of order", reciprocals, work_size, 0, 0.025, 1e-17)
 
 
 @cache

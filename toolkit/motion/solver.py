@@ -45,7 +45,7 @@ class Solver:
     """An equation prepared for given times, accuracy and sensitivities; make it with `Equation.prepare`.
 
     `solve` takes parameters and start; parameters that are those of the last call are not worked out again. It keeps its
-    working memory (so it is not for two threads at once) and, if `learns`, the tolerance that the last call needed.
+    working memory (so it is not for two threads at once) and, if `learns`, begins with the tolerance that would have done in the last call.
     """
 
     def __init__(
@@ -124,6 +124,8 @@ class Solver:
             self._scale, self._by_route = scale, {}
         self._coefficients = code.coefficients(p, scale)
         self._may_be_stiff = bool(not self.sensitivities and code.ROWS[2] and not code.HOLDS)
+        if self._may_be_stiff and code.JACOBIAN_LENGTHS[1] == 1:  # the same for every start
+            self._may_be_stiff = self._is_stiff((0.0, 1.0))
         self._parameters = p
         for work in self._by_route.values():
             work.resolve(p, self._coefficients)
@@ -177,7 +179,8 @@ class _Work:
             self.numbers[5 + 2 * i : 7 + 2 * i] = float(name == START[0]), scale if name == START[1] else 0.0
         self.shape = (2 + 2 * k, tau.size)
         self.report, memory = np.empty(4 + 3 * routes.MOST_EVENTS), np.empty(route.work_size(rows, k))
-        self.first = max(route.first * self.accuracy / (1.0 + 0.3 * float(tau[-1] - self.numbers[3])), route.floor)
+        self.loosest = route.first * self.accuracy
+        self.first = max(self.loosest / (1.0 + 0.3 * float(tau[-1] - self.numbers[3])), route.floor)
         arrays = (
             self.sizes, self.q, layout, columns, self.q[code.N_INNER :], self.numbers, tau, tau, self.report, memory,
             route.table,
@@ -213,7 +216,9 @@ class _Work:
                 break
             tolerance = max(tolerance * 0.3 * accuracy / error, route.floor)
         if self.learns:
-            self.first = tolerance
+            self.first = (
+                max(min(tolerance * 0.3 * accuracy / error, self.loosest), route.floor) if error > 0.0 else tolerance
+            )
         if status == routes.TOO_MANY_STEPS and route.kernel != "rodas":
             raise JobError(
                 f"the equation needs more than {route.most_steps} steps; shorten the time or soften the stiffest effect"
