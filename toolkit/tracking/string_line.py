@@ -52,6 +52,9 @@ def _compiled() -> Any:
         a = b = 0.0  # the line: across = a + b (along − middle)
         width2 = 1.5 * 1.5
         height = 0.0
+        ridge_of, rest_of = np.empty(11), np.empty((100, 11))  # the ridge; each section less its own level and tilt
+        for j in range(11):
+            ridge_of[j] = np.exp(-((j - 5.0) ** 2) / (2 * width2))
         profile = np.empty(17)
         for stage in range(3):
             end = length - 4.0
@@ -74,60 +77,50 @@ def _compiled() -> Any:
                 squares = 0.0
                 count = 0
                 used = 0
-                for pass_ in range(2):
-                    for k in range(sections):
-                        along = start + (k + 0.5) * (end - start) / sections
-                        across = a + b * (along - middle)
-                        qx, qy = bx + ux * along, by + uy * along
-                        level = 0.0
-                        inside = True
-                        for j in range(17):
-                            q = j - 8.0
-                            x = qx - uy * (across + q)
-                            y = qy + ux * (across + q)
-                            ix, iy = int(np.floor(x)), int(np.floor(y))
-                            if ix < 0 or iy < 0 or ix >= columns - 1 or iy >= rows - 1:
-                                inside = False
-                                break
-                            fx, fy = x - ix, y - iy
-                            top = luma[iy, ix] * (1 - fx) + luma[iy, ix + 1] * fx
-                            bottom = luma[iy + 1, ix] * (1 - fx) + luma[iy + 1, ix + 1] * fx
-                            profile[j] = top * (1 - fy) + bottom * fy
-                        if not inside:
+                for k in range(sections):
+                    along = start + (k + 0.5) * (end - start) / sections
+                    across = a + b * (along - middle)
+                    qx, qy = bx + ux * along - uy * (across - 8.0), by + uy * along + ux * (across - 8.0)
+                    rest_of[k, 0] = np.nan
+                    ex, ey = qx - 16.0 * uy, qy + 16.0 * ux
+                    if min(qx, ex) < 0.0 or min(qy, ey) < 0.0 or max(qx, ex) >= columns - 1 or max(qy, ey) >= rows - 1:
+                        continue
+                    for j in range(17):
+                        x, y = qx - uy * j, qy + ux * j
+                        ix, iy = int(x), int(y)
+                        fx, fy = x - ix, y - iy
+                        top = luma[iy, ix] * (1 - fx) + luma[iy, ix + 1] * fx
+                        bottom = luma[iy + 1, ix] * (1 - fx) + luma[iy + 1, ix + 1] * fx
+                        profile[j] = top * (1 - fy) + bottom * fy
+                    level = tilt = 0.0
+                    for j in range(3):
+                        level += (profile[j] + profile[16 - j]) / 6.0
+                        tilt += (profile[16 - j] - profile[j]) / 42.0
+                    for j in range(11):
+                        g = ridge_of[j]
+                        rest_of[k, j] = profile[j + 3] - level - tilt * (j - 5.0)
+                        hh += g * g
+                        hp += g * rest_of[k, j]
+                    used += 1
+                if used < 12:
+                    return False
+                height = hp / hh
+                for k in range(sections):
+                    if np.isnan(rest_of[k, 0]):
+                        continue
+                    lever = start + (k + 0.5) * (end - start) / sections - middle
+                    for j in range(11):
+                        rest = rest_of[k, j] - height * ridge_of[j]
+                        if abs(rest) > 1.5 * abs(height) + 12.0:
                             continue
-                        tilt = 0.0
-                        for j in range(3):
-                            level += profile[j] + profile[16 - j]
-                            tilt += profile[16 - j] - profile[j]
-                        level /= 6.0
-                        tilt /= 42.0
-                        if pass_ == 0:
-                            used += 1
-                            for j in range(3, 14):
-                                q = j - 8.0
-                                g = np.exp(-q * q / (2 * width2))
-                                hh += g * g
-                                hp += g * (profile[j] - level - tilt * q)
-                        else:
-                            lever = along - middle
-                            for j in range(3, 14):
-                                q = j - 8.0
-                                g = np.exp(-q * q / (2 * width2))
-                                rest = profile[j] - level - tilt * q - height * g
-                                if abs(rest) > 1.5 * abs(height) + 12.0:
-                                    continue
-                                slope = height * g * q / width2
-                                n00 += slope * slope
-                                n01 += slope * slope * lever
-                                n11 += slope * slope * lever * lever
-                                r0 += slope * rest
-                                r1 += slope * rest * lever
-                                squares += rest * rest
-                                count += 1
-                    if pass_ == 0:
-                        if used < 12:
-                            return False
-                        height = hp / hh
+                        slope = height * ridge_of[j] * (j - 5.0) / width2
+                        n00 += slope * slope
+                        n01 += slope * slope * lever
+                        n11 += slope * slope * lever * lever
+                        r0 += slope * rest
+                        r1 += slope * rest * lever
+                        squares += rest * rest
+                        count += 1
                 determinant = n00 * n11 - n01 * n01
                 if count < 60 or not determinant > 1e-12 * n00 * n11:
                     return False
