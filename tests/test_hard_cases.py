@@ -152,84 +152,6 @@ def test_sensitivities_of_the_runge_kutta_route(effect):
 
 # -- chaos (q = 2, ω_D = 2/3) -------------------------------------------------------------------------------------
 
-START = ("theta0_rad", "omega0_rad_per_s")
-
-
-def stroboscope(force, state, drives, accuracy=1e-11):
-    """State and Jacobian after a number of drive periods."""
-    p = {**UNIT, "linear_drag.k_d_kg_per_s": 0.5, "cosine_drive.f0_n": force, "cosine_drive.f_hz": 1 / T_DRIVE}
-    p["cosine_drive.phase_rad"] = 0.0
-    equation = build_equation(["linear_drag", "cosine_drive"])
-    s = equation.solve(p, state[0], state[1], [drives * T_DRIVE], accuracy, START)
-    return np.array([s.theta_rad[0], s.omega_rad_per_s[0]]), np.array([s.d_theta[0], s.d_omega[0]])
-
-
-def wrapped(state):
-    return np.array([math.remainder(state[0], 2 * np.pi), state[1]])
-
-
-def test_volume_shrinks_exactly():
-    _, jacobian = stroboscope(1.2, (0.1, 0.2), 1)
-    assert np.linalg.det(jacobian) == pytest.approx(0.008983291021, rel=1e-9)
-
-
-def test_period_doubling_thresholds():
-    """Follow the orbit through its doublings: Newton on the orbit, then the force at which a Floquet multiplier is −1."""
-    state = np.zeros(2)
-    for low, high, drives, expected in (
-        (1.06, 1.065, 1, 1.06637286),
-        (1.075, 1.078, 2, 1.07931391),
-        (1.0815, 1.0819, 4, 1.08208438),
-        (1.0825, 1.0826, 8, 1.08267835),
-    ):
-        for _ in range(300):
-            state = wrapped(stroboscope(low, state, drives, 1e-8)[0])
-        force, state = _doubling(low, high, drives, state)
-        assert force == pytest.approx(expected, abs=2e-8)
-
-
-def _doubling(low, high, drives, state):
-    def closed(force, guess):
-        for _ in range(12):
-            after, jacobian = stroboscope(force, guess, drives)
-            step = np.linalg.solve(jacobian - np.eye(2), wrapped(guess - after))
-            guess = guess + step
-            assert np.abs(step).max() < 1  # else Newton has left the orbit
-            if np.abs(step).max() < 1e-11:
-                break
-        return guess, 1 + np.trace(jacobian) + np.linalg.det(jacobian)  # (1 + m₁)(1 + m₂)
-
-    a, b = low, high
-    state, at_a = closed(a, state)
-    state, at_b = closed(b, state)
-    for _ in range(12):
-        a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
-        state, at_b = closed(b, state)
-        if abs(b - a) < 1e-10:
-            break
-    return b, state
-
-
-@pytest.mark.parametrize(
-    ("force", "expected", "within"),
-    [(0.9, -0.25, 1e-4), (1.15, 0.0985, 0.006), (1.2, 0.1316, 0.006), (1.5, 0.1128, 0.006)],
-)
-def test_largest_lyapunov_exponent(force, expected, within):
-    found = [_lyapunov_exponent(force, theta) for theta in (0.10, 0.13, 0.15)]
-    assert np.mean(found) == pytest.approx(expected, abs=within)  # each scatters by 0.003: chaos is sampled
-
-
-def _lyapunov_exponent(force, theta):
-    state, direction, total = np.array([theta, 0.2]), np.array([1.0, 0.0]), 0.0
-    chunk, count, skipped = 12, 300, 20
-    for i in range(count):
-        state, jacobian = stroboscope(force, state, chunk, 1e-6)
-        state, direction = wrapped(state), jacobian @ direction
-        growth = float(np.hypot(*direction))
-        direction /= growth
-        total += math.log(growth) if i >= skipped else 0.0
-    return total / ((count - skipped) * chunk * T_DRIVE)
-
 
 def test_chaos_says_when_the_accuracy_cannot_be_had():
     table = {
@@ -328,22 +250,6 @@ def test_drive_without_damping_from_rest_at_the_bottom():
     t = np.linspace(0, 60, 31)
     solved = build_equation(["cosine_drive"]).solve(p, 0.0, 0.0, t, 1e-10)
     np.testing.assert_allclose(solved.theta_rad, integrate(p, 0.0, 0.0, t), atol=1e-10)
-
-
-def test_hysteresis_of_the_driven_pendulum():
-    """Q = 50, F₀/mg = 0.03 at ω = 0.95: one drive, two steady amplitudes, 0.3580 and 0.9999 rad."""
-    p = {**UNIT, "linear_drag.k_d_kg_per_s": 0.02, "cosine_drive.f0_n": 0.03, "cosine_drive.f_hz": 0.95 / (2 * np.pi)}
-    p["cosine_drive.phase_rad"] = 0.0
-    equation = build_equation(["linear_drag", "cosine_drive"])
-    period = 2 * np.pi / 0.95
-    t = 400 * period + np.linspace(0, period, 2001)
-    low = np.abs(equation.solve(p, 0.0, 0.0, t, 1e-8).theta_rad).max()
-    assert low == pytest.approx(0.3580, abs=2e-4)
-    highest = max(
-        np.abs(equation.solve(p, 1.0 * np.cos(a), -0.95 * np.sin(a), t, 1e-8).theta_rad).max()
-        for a in np.linspace(0, 2 * np.pi, 9)
-    )
-    assert highest == pytest.approx(0.9999, abs=2e-4)
 
 
 def test_over_the_top_keeps_counting():
