@@ -124,16 +124,15 @@ def fit_models(
     progress: Progress = silent,
     **options: Any,
 ) -> dict[str, FitResult]:
-    """Fit several models (default: the five of the ladder) so that they can be compared.
+    """Fit several models so that they can be compared; by default the five of the ladder, and `scene` where the scene names
+    what none of them has (a thread's drag, buoyancy, a formula …).
 
     Where the series has no σ, all models are weighed with the scatter left by the best of them; where the residuals
     are correlated, AIC and BIC of all use the number of points that are effectively independent under the best of
     them. A given length that contradicts the record is freed for all models, with a warning. `options` go to `fit`.
     """
-    from toolkit.models import STANDARD
-
     scene = scene or Scene()
-    names = tuple(models or STANDARD)
+    names = tuple(models or _ladder(scene))
     fits = _fit_all(series, scene, names, options, progress)
     freed = _freed_length(series, scene, fits, options)
     if freed is not None:
@@ -142,6 +141,20 @@ def fit_models(
         fits = {name: replace(result, warnings=(*result.warnings, freed)) for name, result in again.items()}
     progress("fitting", 1.0)
     return _compared(fits)
+
+
+def _ladder(scene: Scene) -> tuple[str, ...]:
+    from toolkit.models import STANDARD
+    from toolkit.models.model import REDUCED
+
+    known = scene.pendulum.mass_kg is not None and scene.pendulum.length_m is not None
+    more = [name for name in scene.effects if name not in REDUCED and name != "slack_string"]
+    return (*STANDARD, "scene") if more and known else STANDARD
+
+
+def has_full_sine(result: FitResult) -> bool:
+    """Whether a fit's equation has sin θ, not θ."""
+    return result.model.startswith("full") if result.problem is None else not result.problem.model.small_angle
 
 
 def _fit_all(
@@ -188,17 +201,17 @@ def choose_model(fits: Mapping[str, FitResult]) -> str:
         raise UsageError("there are no fits to choose from; fit at least one model")
     good = {name: result for name, result in fits.items() if result.success} or dict(fits)
     sound = {name: result for name, result in good.items() if not _too_large(result)}
-    good = sound if any(name.startswith("full") for name in sound) else good
+    good = sound if any(has_full_sine(result) for result in sound.values()) else good
     lowest = min(result.aic for result in good.values())
     near = [name for name, result in good.items() if result.aic <= lowest + 2]
-    exact = [name for name in near if name.startswith("full")]
+    exact = [name for name in near if has_full_sine(good[name])]
     by_simplicity = {name: (len(good[name].free), not name.endswith("linear_drag"), good[name].aic) for name in good}
     return min(exact or near or list(good), key=lambda name: by_simplicity[name])
 
 
 def _too_large(result: FitResult) -> bool:
     """Whether a small-angle model's swing lengthens the period, by A²/16, by more than twice what ω_g is known to."""
-    if not result.model.startswith("small_angle"):
+    if has_full_sine(result):
         return False
     omega = result.parameters.get("omega_g") or result.derived.get("omega_g")
     if omega is None or not omega.stderr:
@@ -212,9 +225,7 @@ def _freed_length(
 ) -> str | None:
     """A warning, if the record contradicts the length given."""
     held = {
-        n: r
-        for n, r in fits.items()
-        if n.startswith("full") and "length" in r.parameters and r.parameters["length"].fixed
+        n: r for n, r in fits.items() if has_full_sine(r) and "length" in r.parameters and r.parameters["length"].fixed
     }
     if not held or "length" in (options.get("fixed") or {}):
         return None

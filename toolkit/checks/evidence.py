@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from toolkit.fit import FitResult, fit
+from toolkit.fit import FitResult, fit, has_full_sine
 from toolkit.fitting.noise import Noise, measure_noise
 from toolkit.scene import Scene
 from toolkit.series import ThetaSeries
@@ -30,7 +30,7 @@ class Evidence:
     @property
     def best(self) -> FitResult:
         """The full-sine fit with the lowest χ² (the preferred one where none has the full sine)."""
-        full = [r for r in self.fits.values() if r.success and r.model.startswith("full")]
+        full = [r for r in self.fits.values() if r.success and has_full_sine(r)]
         return min(full, key=lambda r: r.chi2) if full else self.fits[self.preferred]
 
     @property

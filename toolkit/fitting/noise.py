@@ -17,6 +17,7 @@ _LARGEST_ORDER = 8
 _WHITE_P = 1e-3
 _LAGS = 20
 _GRID = 1 << 14
+_MOST_TAKEN = 0.5
 
 
 @dataclass(frozen=True)
@@ -64,12 +65,20 @@ class Noise:
 
 
 def measure_noise(
-    normalised: np.ndarray, sigma_rad: np.ndarray | float, known: bool, omega: float, step_s: float, free: int
+    normalised: np.ndarray,
+    sigma_rad: np.ndarray | float,
+    known: bool,
+    omega: float,
+    step_s: float,
+    free: int,
+    jacobian: np.ndarray | None = None,
 ) -> Noise:
     """The noise from residuals divided by the σ used (`normalised`, (n,)).
 
     known : whether σ came with the series.    omega : the pendulum's, rad/s.    step_s : typical time between points.
-    free : number of fitted parameters.
+    free : number of fitted parameters.    jacobian : (n, k) derivatives over σ; with it what the fit took out of correlated
+    noise is put back. The residuals of a fit are poorest where the fit listens, at the pendulum's frequency, and short
+    records of slow noise would else get error bars too small by a tenth.
     """
     n = normalised.size
     dof = max(n - free, 1)
@@ -81,10 +90,18 @@ def measure_noise(
     rho = autocorrelation(r, min(_LAGS, n // 4))
     durbin = float(np.sum(np.diff(r) ** 2) / (r @ r))
     p = ljung_box(rho, n)
-    agrees = abs(scale**2 - 1) < 4 * math.sqrt(2 / dof)
-    used = 1.0 if known and agrees else scale
     white = p > _WHITE_P
-    coefficients = () if white else autoregression(r)
+    coefficients, put_back, alike = np.empty(0), 0.0, 1.0
+    if not white:
+        coefficients = autoregression(r)
+        if jacobian is not None and coefficients.size:
+            coefficients, put_back = _with_what_the_fit_took(r, coefficients, jacobian)
+            scale *= math.sqrt((1 - free / n) / (1 - put_back))
+            sigma *= math.sqrt((1 - free / n) / (1 - put_back))
+        power = _power(coefficients, _GRID)
+        alike = float(np.mean(power**2) / np.mean(power) ** 2)  # Σ ρ²: so many points tell the variance as one
+    agrees = abs(scale**2 - 1) < 4 * math.sqrt(2 * alike / dof)
+    used = 1.0 if known and agrees else scale
     inflation = used * math.sqrt(spectrum(coefficients, omega * step_s))
     return Noise(
         sigma_rad=sigma,
@@ -145,6 +162,48 @@ def autoregression(x: np.ndarray) -> np.ndarray:
     return best
 
 
+def _with_what_the_fit_took(r: np.ndarray, a: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
+    """The autoregression of the noise from that of residuals, and the share of its variance that the fit took.
+
+    Residuals are M e with M = 1 − Q Qᵀ (Q spans what the parameters can do), so their autocovariance at lag k falls short of
+    the noise's by tr D_k (Σ − M Σ M)/n, with D_k the shift by k; that shortfall is computed from the autoregression itself,
+    three times over.
+    """
+    from scipy.linalg import solve_toeplitz
+
+    n, order = r.size, a.size
+    size = np.linalg.norm(jacobian, axis=0)
+    basis, _ = np.linalg.qr(jacobian[:, size > 0] / size[size > 0])
+    seen = np.concatenate([[1.0], autocorrelation(r, order)])
+    first, short = a, np.zeros(order + 1)
+    for _ in range(3):
+        carried = _correlated(basis, first)
+        both = basis.T @ carried
+        for lag in range(order + 1):
+            left, right = basis[lag:], basis[: n - lag]
+            single = np.sum(left * carried[: n - lag]) + np.sum(carried[lag:] * right)
+            short[lag] = (single - np.sum(both * (left.T @ right))) / n
+        if not short[0] < _MOST_TAKEN:
+            return a, min(max(float(short[0]), 0.0), _MOST_TAKEN)
+        rho = seen * (1 - short[0]) + short
+        better = solve_toeplitz(rho[:order] / rho[0], rho[1:] / rho[0])
+        if np.max(np.abs(np.roots(np.concatenate([[1.0], -better])))) >= 0.9999:  # would not die away
+            break
+        first = better
+    return first, max(float(short[0]), 0.0)
+
+
+def _correlated(columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """(n, k) R columns, R the correlation matrix that the autoregression implies: diagonal in frequency once the columns are
+    padded to beyond its reach."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    size = 2 * next_fast_len(max(columns.shape[0], _GRID // 2))
+    power = _power(a, size)
+    weight = power[: size // 2 + 1] / np.mean(power)
+    return np.asarray(irfft(rfft(columns, size, axis=0) * weight[:, None], size, axis=0)[: columns.shape[0]])
+
+
 def spectrum(coefficients: tuple[float, ...] | np.ndarray, phase: float) -> float:
     """Power of the autoregression at `phase` = ω Δt, relative to white noise of the same variance."""
     if len(coefficients) == 0:
@@ -160,15 +219,7 @@ def _power(a: np.ndarray, size: int) -> np.ndarray:
 
 
 def spread(jacobian: np.ndarray, noise: Noise) -> np.ndarray:
-    """Jᵀ R J (k, k) for residuals with that noise: J is (n, k), already divided by σ. By Parseval: R is diagonal in
-    frequency once the columns are padded to beyond the reach of the correlation."""
+    """Jᵀ R J (k, k) for residuals with that noise: J is (n, k), already divided by σ."""
     if len(noise.coefficients) == 0:
         return np.asarray(noise.scale_used**2 * (jacobian.T @ jacobian))
-    from scipy.fft import next_fast_len, rfft
-
-    size = 2 * next_fast_len(max(jacobian.shape[0], _GRID // 2))
-    power = _power(np.asarray(noise.coefficients), size)
-    weight = power[: size // 2 + 1] / (size * np.mean(power))
-    weight[1:-1] *= 2  # each frequency but the first and last stands for two
-    waves = rfft(jacobian, size, axis=0)
-    return np.asarray(noise.scale_used**2 * np.real(np.conj(waves.T) @ (waves * weight[:, None])))
+    return np.asarray(noise.scale_used**2 * (jacobian.T @ _correlated(jacobian, np.asarray(noise.coefficients))))

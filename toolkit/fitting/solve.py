@@ -91,8 +91,8 @@ def _report(problem: Problem, found: Solved) -> FitResult:
     normalised = residual / sigma
     reduced, _ = problem.reduce(values)
     step = float(np.median(np.diff(problem.t_s)))
-    noise = measure_noise(normalised, sigma, problem.sigma_known, reduced["omega_g"], step, k)
     jacobian = by / sigma[:, None]
+    noise = measure_noise(normalised, sigma, problem.sigma_known, reduced["omega_g"], step, k, jacobian)
     covariance, singular = _covariance(problem, jacobian, noise)
     parameters = {}
     for name, value in values.items():

@@ -39,6 +39,7 @@ _EQUATION_NAME = {
     "f": "cosine_drive.f_hz",
     "drive_phase": "cosine_drive.phase_rad",
 }
+_IN_TIME = ("shift", "stretch")
 _ACCURACY_RAD = 1e-9
 
 
@@ -72,7 +73,8 @@ class Model:
     name : as in fit.json.    summary : a few words for tables.    effects : of `toolkit.effects`; they make the equation.
     small_angle : θ in place of sin θ.    closed_form : the paper's analytic solution (needs linear_drag, small_angle).
     fixed : effect parameters and pendulum constants that are not fitted, for the equation in the scene's own units
-    (empty for the reduced equation).
+    (empty for the reduced equation).    formula : text of the scene's own torque.    from_scene : effects and small_angle
+    are those of the scene (see `within`).
     """
 
     name: str
@@ -81,6 +83,8 @@ class Model:
     small_angle: bool = False
     closed_form: bool = False
     fixed: Mapping[str, float] = field(default_factory=dict)
+    formula: str = ""
+    from_scene: bool = False
 
     @property
     def coefficients(self) -> tuple[str, ...]:
@@ -107,10 +111,14 @@ class Model:
 
         Raises UsageError where the scene lacks a number that the equation needs.
         """
-        effects = self.effects
+        effects, small_angle, formula = self.effects, self.small_angle, self.formula
+        if self.from_scene:
+            effects = tuple(name for name in scene.effects if name != "slack_string")  # which only watches the tension
+            small_angle = scene.approximations.small_angle
+            formula = str(scene.effects.get("formula", {}).get("torque", ""))
         if "cosine_drive" in scene.effects and "cosine_drive" not in effects:
             effects = (*effects, "cosine_drive")
-        model = replace(self, effects=effects)
+        model = replace(self, effects=effects, small_angle=small_angle, formula=formula)
         return replace(model, fixed=model._constants(scene)) if model.needs_scene else model
 
     def _constants(self, scene: Scene) -> dict[str, float]:
@@ -151,9 +159,22 @@ class Model:
             return self._closed_form(values, t_s, by)
         parameters, scale = self._parameters(values)
         start = self._start(values)
-        if self.fixed or "cosine_drive" in self.effects:
-            return self._moved(parameters, scale, start, values, t_s, by)
-        return self._free(parameters, scale, start, values, t_s, by, rates)
+        autonomous = not (self.fixed or "cosine_drive" in self.effects)
+        chain = (self._chain_in_time if autonomous else self._chain)(values, parameters, scale, start, by)
+        asked = tuple(dict.fromkeys(c for parts in chain for c in parts if c not in _IN_TIME))
+        solution = self._equation().solve(
+            parameters, start.theta, start.omega, t_s, accuracy_rad=_ACCURACY_RAD, sensitivities=asked
+        )
+        theta, omega = solution.theta_rad, solution.omega_rad_per_s
+        rate = self._acceleration(values, theta, omega) if autonomous and rates else None
+        columns = {c: solution.d_theta[:, i] for i, c in enumerate(asked)}
+        d_theta = _combined(chain, columns | {"shift": omega, "stretch": t_s * omega}, len(t_s))
+        if not rates:
+            return Motion(theta, omega, d_theta, np.empty((0, len(by))), solution.method)
+        columns = {c: solution.d_omega[:, i] for i, c in enumerate(asked)}
+        if rate is not None:
+            columns |= {"shift": rate, "stretch": t_s * rate + omega}
+        return Motion(theta, omega, d_theta, _combined(chain, columns, len(t_s)), solution.method)
 
     def _parameters(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
         """The equation's parameters, and by how much each grows with its reduced coefficient."""
@@ -170,95 +191,57 @@ class Model:
         parameters |= {_EQUATION_NAME[name]: scale[name] * values[name] for name in self.coefficients}
         return parameters, {name: scale[name] for name in self.coefficients}
 
-    def _moved(
+    def _chain(
         self,
-        parameters: dict[str, float],
-        scale: dict[str, float],
-        start: _Start,
         values: Mapping[str, float],
-        t_s: np.ndarray,
-        by: Sequence[str],
-    ) -> Motion:
-        """Any equation: every derivative from the variational equations."""
-        asked = [_EQUATION_NAME[name] for name in by if name in scale]
-        if any(name in start.by for name in by):
-            asked += ["theta0_rad", "omega0_rad_per_s"]
-        if "omega_g" in by:
-            asked.append("g_m_per_s2")
-        solution = self._solve(parameters, start, t_s, asked)
-        d_theta, d_omega = np.empty((2, len(t_s), len(by)))
-        for block, out in ((solution.d_theta, d_theta), (solution.d_omega, d_omega)):
-            for i, name in enumerate(by):
-                if name in scale:
-                    out[:, i] = scale[name] * block[:, asked.index(_EQUATION_NAME[name])]
-                    continue
-                by_theta, by_omega = start.by[name]
-                first = asked.index("theta0_rad")
-                out[:, i] = by_theta * block[:, first] + by_omega * block[:, first + 1]
-                if name == "omega_g":
-                    g_by_omega = 2 * parameters["g_m_per_s2"] / values["omega_g"]
-                    out[:, i] += g_by_omega * block[:, asked.index("g_m_per_s2")]
-        return Motion(solution.theta_rad, solution.omega_rad_per_s, d_theta, d_omega, solution.method)
-
-    def _free(
-        self,
-        parameters: dict[str, float],
-        scale: dict[str, float],
+        parameters: Mapping[str, float],
+        scale: Mapping[str, float],
         start: _Start,
-        values: Mapping[str, float],
-        t_s: np.ndarray,
         by: Sequence[str],
-        rates: bool,
-    ) -> Motion:
-        """The reduced equation without a drive. Two variational equations fewer: time does not appear in it, so a shift
-        in time (θ̇, θ̈) is the derivative along one start; and a unit of time can be chosen, so that
-        ω_g ∂θ/∂ω_g = t θ̇ − α_d ∂θ/∂α_d − 2 μ ∂θ/∂μ at the same θ₀, φ."""
-        coefficients = [name for name in by if name in scale]
-        if "omega_g" in by:
-            coefficients += [n for n in ("alpha_d", "mu") if n in scale and n not in by and values[n] != 0]
-        asked = [_EQUATION_NAME[name] for name in coefficients]
-        moving = "theta0" in by or "phi" in by
-        by_omega_start = abs(start.omega) * values["omega_g"] >= abs(
-            self._acceleration(values, start.theta, start.omega)
-        )
-        if moving:
-            asked.append("omega0_rad_per_s" if by_omega_start else "theta0_rad")
-        solution = self._solve(parameters, start, t_s, asked)
-        theta, omega = solution.theta_rad, solution.omega_rad_per_s
-        if not by:
-            return Motion(theta, omega, np.empty((len(t_s), 0)), np.empty((len(t_s), 0)), solution.method)
-        acceleration = self._acceleration(values, theta, omega) if rates else omega
-        at_start = float(self._acceleration(values, start.theta, start.omega))
-        d_theta = np.empty((len(by), len(t_s))).T  # column by column in memory
-        d_omega = np.empty((len(by), len(t_s) if rates else 0)).T
-        for block, out, rate in ((solution.d_theta, d_theta, omega), (solution.d_omega, d_omega, acceleration)):
-            if not out.size:
+    ) -> list[dict[str, float]]:
+        """How each derivative is made of those by the equation's own parameters and start, for any equation."""
+        chain = []
+        for name in by:
+            if name in scale:
+                chain.append({_EQUATION_NAME[name]: scale[name]})
                 continue
-            along = {name: scale[name] * block[:, i] for i, name in enumerate(coefficients)}
-            for i, name in enumerate(by):
-                if name in along:
-                    out[:, i] = along[name]
-                elif name == "omega_g":
-                    out[:, i] = t_s * rate + (omega if out is d_omega else 0.0)
-                    for other, power in (("alpha_d", 1), ("mu", 2)):
-                        if other in along:
-                            out[:, i] -= power * values[other] * along[other]
-                    out[:, i] /= values["omega_g"]
-                else:  # a start is so much of a shift in time and so much of the one that was solved for
-                    by_theta, by_omega = start.by[name]
-                    if by_omega_start:
-                        shift = by_theta / start.omega
-                        left = by_omega - shift * at_start
-                    else:
-                        shift = by_omega / at_start
-                        left = by_theta - shift * start.omega
-                    out[:, i] = shift * rate + left * block[:, -1]
-        return Motion(theta, omega, d_theta, d_omega, solution.method)
+            by_theta, by_omega = start.by[name]
+            chain.append({"theta0_rad": by_theta, "omega0_rad_per_s": by_omega})
+            if name == "omega_g":
+                chain[-1]["g_m_per_s2"] = 2 * parameters["g_m_per_s2"] / values["omega_g"]
+        return chain
 
-    def _solve(self, parameters: dict[str, float], start: _Start, t_s: np.ndarray, asked: Sequence[str]) -> Any:
-        return self._equation().solve(
-            parameters, start.theta, start.omega, t_s, accuracy_rad=_ACCURACY_RAD, sensitivities=tuple(asked)
-        )
+    def _chain_in_time(
+        self,
+        values: Mapping[str, float],
+        parameters: Mapping[str, float],
+        scale: Mapping[str, float],
+        start: _Start,
+        by: Sequence[str],
+    ) -> list[dict[str, float]]:
+        """The same for the reduced equation without a drive, with two variational equations fewer: time does not appear in
+        it, so a shift in time (θ̇, θ̈) is the derivative along one start; and a unit of time can be chosen, so that
+        ω_g ∂θ/∂ω_g = t θ̇ − α_d ∂θ/∂α_d − 2 μ ∂θ/∂μ at the same θ₀, φ."""
+        at_start = float(self._acceleration(values, start.theta, start.omega))
+        from_speed = abs(start.omega) * values["omega_g"] >= abs(at_start)  # which start a shift in time stands in for
+        chain = []
+        for name in by:
+            if name in scale:
+                chain.append({_EQUATION_NAME[name]: scale[name]})
+            elif name == "omega_g":
+                chain.append({"stretch": 1 / values["omega_g"]})
+                for other, power in (("alpha_d", 1), ("mu", 2)):
+                    if other in scale and (values[other] != 0 or other in by):
+                        chain[-1][_EQUATION_NAME[other]] = -power * values[other] * scale[other] / values["omega_g"]
+            else:
+                by_theta, by_omega = start.by[name]
+                if from_speed:
+                    shift = by_theta / start.omega
+                    chain.append({"shift": shift, "omega0_rad_per_s": by_omega - shift * at_start})
+                else:
+                    shift = by_omega / at_start
+                    chain.append({"shift": shift, "theta0_rad": by_theta - shift * start.omega})
+        return chain
 
     def _acceleration(self, values: Mapping[str, float], theta: Any, omega: Any) -> Any:
         """θ̈ of the reduced equation without a drive."""
@@ -286,7 +269,7 @@ class Model:
         return _Start(2 * math.asin(kappa * sine), 2 * kappa * omega_g * cosine, by)
 
     def _equation(self) -> Any:
-        return _equation(self.effects, self.small_angle)
+        return _equation(self.effects, self.small_angle, self.formula)
 
     def _closed_form(self, values: Mapping[str, float], t_s: np.ndarray, by: Sequence[str]) -> Motion:
         from toolkit.motion.closed_form import paper_model
@@ -311,8 +294,17 @@ class Model:
         )
 
 
+def _combined(chain: Sequence[Mapping[str, float]], columns: Mapping[str, np.ndarray], count: int) -> np.ndarray:
+    """(n, k) sums of the named columns, column by column in memory."""
+    out = np.zeros((len(chain), count))
+    for row, parts in zip(out, chain):
+        for column, weight in parts.items():
+            row += weight * columns[column]
+    return out.T
+
+
 @functools.lru_cache(maxsize=32)
-def _equation(effects: tuple[str, ...], small_angle: bool) -> Any:
+def _equation(effects: tuple[str, ...], small_angle: bool, formula: str) -> Any:
     from toolkit.motion import build_equation
 
-    return build_equation(effects, small_angle=small_angle)
+    return build_equation(effects, small_angle, {"formula": formula} if formula else None)
