@@ -31,9 +31,10 @@ def make_report(
     Returns the analysis and the paths of the report's files. Raises UsageError for an unknown format or language
     before anything is done, JobError where the recording cannot be used.
     """
-    from toolkit.report import build_report, check_choice, write_report
+    from toolkit.report import build_report, check_choice, import_ahead, write_report
 
     check_choice(formats, lang)
+    import_ahead(formats)
     out = Path(out)
     with whole_folder(out) as folder:
         analysis = analyse(recording, scene, models=models, progress=progress, **measuring)

@@ -28,6 +28,20 @@ def check_choice(formats: Sequence[str], lang: str) -> None:
     load_words(lang)
 
 
+def import_ahead(formats: Sequence[str]) -> None:
+    """Import what figures and writers need beside the measuring, which mostly waits for decoders and machine code."""
+    from threading import Thread
+
+    needed = ["toolkit.report.build", "matplotlib.backends.backend_svg", "matplotlib.font_manager"]
+    needed += [name for kind, name in (("html", "jinja2"), ("pdf", "typst")) if kind in formats]
+
+    def import_all() -> None:
+        for name in needed:
+            importlib.import_module(name)
+
+    Thread(target=import_all, daemon=True).start()
+
+
 def build_report(analysis: Any, lang: str = "en") -> Report:
     """All that the report says, with its figures drawn. Raises UsageError for an unknown language."""
     from toolkit.report.build import build

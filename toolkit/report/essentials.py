@@ -31,7 +31,8 @@ def lead(material: Material) -> str:
         ends = cycles.amplitude_rad[0], cycles.amplitude_rad[-1]
         first, last = (number(math.degrees(a), 3) for a in ends)
         swings = round(series.duration_s / float(np.median(cycles.period_s)))
-        text = words("page.lead", swings=swings, first=first, last=last, **common)
+        fell = "page.lead" if ends[1] < 0.97 * ends[0] else "page.lead_steady"
+        text = words(fell, swings=swings, first=first, last=last, **common)
     recorded = series.meta.get("recorded_on")
     return f"{text} {words('page.recorded', date=words.date(recorded))}" if recorded else text
 

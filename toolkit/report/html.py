@@ -41,6 +41,7 @@ def render(report: Report) -> str:
         style=Markup(style),
         word=report.words,
         marks=rich,
+        plain=bare,
         inline=inline,
         kind_of=lambda block: type(block).__name__,
         number_of=numbering(report),

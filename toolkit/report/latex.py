@@ -84,7 +84,7 @@ def render(report: Report) -> str:
         _text(report.lead),
         "",
     ]
-    parts += [r"\begingroup\sloppy  % numbers with units are long words", "\\begin{description}"]
+    parts += [r"\begingroup\sloppy", "\\begin{description}"]
     for fact in report.facts:
         remark = f" {{\\small {_text(fact.remark)}}}" if fact.remark else ""
         parts.append(f"\\item[{_text(fact.question)}] {_text(fact.answer)}.{remark}")
