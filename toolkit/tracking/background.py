@@ -70,23 +70,20 @@ def _compiled() -> Any:
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
     def add(plane, mean, seen, x0, y0, x1, y1, bx, by, radius, px, py, factor, most):
-        has_string = not np.isnan(px)
-        ux, uy = px - bx, py - by
+        string = 0.0 if np.isnan(px) else 1.0
+        ux, uy = (px - bx, py - by) if string else (1.0, 0.0)
         length = np.sqrt(ux * ux + uy * uy) + 1e-9
         ux, uy = ux / length, uy / length
-        for y in range(y0, y1):
-            dy = y - by
-            for x in range(x0, x1):
-                dx = x - bx
-                if dx * dx + dy * dy < radius * radius:
-                    continue
-                if has_string:
-                    along = dx * ux + dy * uy
-                    if along > 0 and abs(dx * uy - dy * ux) < 4.0 + 0.25 * max(0.0, 2 * radius - along):
-                        continue
-                n = seen[y, x] + 1.0
-                n = min(n, most)
-                seen[y, x] = n
-                mean[y, x] += (plane[y - y0, x - x0] * factor - mean[y, x]) / n
+        for y in range(y1 - y0):
+            row, known, new = mean[y0 + y, x0:x1], seen[y0 + y, x0:x1], plane[y, : x1 - x0]
+            dy = y0 + y - by
+            for x in range(x1 - x0):  # without a branch, so that several pixels are done at once
+                dx = x0 + x - bx
+                along = dx * ux + dy * uy
+                wide = string * (4.0 + 0.25 * max(0.0, 2 * radius - along))
+                hidden = (dx * dx + dy * dy < radius * radius) | ((along > 0) & (abs(dx * uy - dy * ux) < wide))
+                n = min(known[x] + 1.0, most)
+                row[x] += 0.0 if hidden else (new[x] * factor - row[x]) / n
+                known[x] = known[x] if hidden else n
 
     return add
