@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from datetime import date
 
 import numpy as np
 import pytest
@@ -407,6 +408,40 @@ def test_phyphox_gyroscope_is_integrated(tmp_path):
         assert np.sqrt(np.mean((series.theta_rad - theta) ** 2)) < 1.5e-3
 
 
+@pytest.mark.parametrize(("between", "point"), [(",", "."), ("\t", "."), (";", "."), ("\t", ","), (";", ",")])
+def test_phyphox_in_each_of_its_csv_variants(tmp_path, between, point):
+    """The five CSV exports that the app offers: quoted names, ten digits with an exponent, NaN for a missing cell, and a
+    folder of metadata at the archive's end."""
+
+    def shown(value):
+        if np.isnan(value):
+            return "NaN"
+        digits, power = f"{value:.9E}".split("E")
+        return f"{digits.replace('.', point)}E{int(power)}"
+
+    t = 0.0049 + np.arange(2500) / 100
+    rate = -0.3 * 2.9 * np.sin(2.9 * t)
+    axes = [0.001 * np.sin(t), rate, np.full_like(t, -0.002), np.abs(rate)]
+    axes[0][-1] = np.nan
+    names = ["Time (s)", "Gyroscope x (rad/s)", "Gyroscope y (rad/s)", "Gyroscope z (rad/s)", "Absolute (rad/s)"]
+    lines = [between.join(f'"{name}"' for name in names)]
+    lines += [between.join(map(shown, row)) for row in zip(t, *axes)]
+    event = ['"START"', shown(0.0), f"1763800000{point}123", '"2026-11-22 09:26:40.123 UTC+07:00"']
+    title = ['"event"', '"experiment time"', '"system time"', '"system time text"']
+    path = tmp_path / "Gyroscope 2026-11-22 09-26-40.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("Raw Data.csv", "\n".join([*lines, ""]))
+        archive.writestr("meta/device.csv", f'"property"{between}"value"\n"version"{between}"1.2.0"\n')
+        archive.writestr("meta/time.csv", f"{between.join(title)}\n{between.join(event)}\n")
+    series = read_series(path)
+    assert len(series) == t.size
+    assert np.sqrt(np.mean((series.theta_rad - 0.3 * np.cos(2.9 * t)) ** 2)) < 1e-3
+    assert series.meta["recorded_on"] == date(2026, 11, 22)
+    raw = tmp_path / "raw.csv"
+    raw.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    assert np.array_equal(read_series(raw).theta_rad, series.theta_rad)
+
+
 def test_phyphox_without_a_gyroscope(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         archive.writestr("Raw Data.csv", '"Time (s)","Sound pressure (dB)"\n0,1\n1,2\n2,3\n3,2\n')
@@ -492,3 +527,33 @@ def test_the_project_and_its_export_agree(shared_data):
     assert len(ours) == len(theirs)
     assert np.max(np.abs(ours.theta_rad - theirs.theta_rad)) < 1e-4
     assert np.max(np.abs(ours.t_s - theirs.t_s)) < 0.04  # their times are frame/12 Hz by a rounded rate
+
+
+def test_a_written_project_has_what_tracker_s_loaders_ask_for(tmp_path):
+    """Tracker takes a missing boolean as false and a missing number as NaN: a track would be there and not be seen."""
+    from xml.etree import ElementTree
+
+    t = np.arange(50) / 25
+    write_series(ThetaSeries(t, 0.4 * np.cos(5 * t), None, {"length_m": 0.4, "mass_kg": 0.1}), tmp_path / "swing.trk")
+    panel = ElementTree.parse(tmp_path / "swing.trk").getroot()
+    assert panel.get("class") == "org.opensourcephysics.cabrillo.tracker.TrackerPanel"
+
+    def child(parent, name):
+        return next(p for p in parent.findall("property") if p.get("name") == name)
+
+    def names(parent):
+        return {p.get("name") for p in parent.findall("property")}
+
+    assert {"width", "height", "magnification", "videoclip", "clipcontrol", "coords", "tracks"} <= names(panel)
+    assert {"startframe", "stepsize", "stepcount", "starttime"} <= names(child(panel, "videoclip").find("object"))
+    assert {"rate", "delta_t", "frame"} <= names(child(panel, "clipcontrol").find("object"))
+    coords = child(panel, "coords").find("object")
+    assert {"fixedorigin", "fixedangle", "fixedscale", "locked", "framedata"} <= names(coords)
+    mass = child(panel, "tracks").find("property/object")
+    assert {"mass", "name", "color", "footprint", "visible", "trail", "framedata"} <= names(mass)
+    assert child(mass, "visible").text == "true"
+    steps = child(mass, "framedata")
+    assert [p.get("name") for p in steps] == [f"[{k}]" for k in range(50)]
+    assert all(names(p.find("object")) == {"x", "y"} for p in steps)
+    kinds = {p.get("type") for p in panel.iter("property")}
+    assert kinds <= {"string", "double", "int", "boolean", "object", "array", "collection"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from toolkit.series_io.tracker_trk import member_of_zip
 
 _MAX_CSV_BYTES = 200_000_000
 _TIME = re.compile(r"(time|t)\s*\(s\)\Z", re.IGNORECASE)
+_DAY = re.compile(r'"(\d{4}-\d\d-\d\d) \d\d:\d\d')
 _RATE = re.compile(r"(gyroscope|angular velocity|rotation rate)\b.*\(rad/s\)\Z", re.IGNORECASE)
 _ANGLE = re.compile(r"(angle|tilt|inclination|pitch|roll)\b.*\((deg|°|rad)\)\Z", re.IGNORECASE)
 
@@ -33,8 +35,10 @@ def _recognises(look: Look) -> bool:
 def read(path: Path) -> ThetaSeries:
     """θ from the angle column, else from the integrated rate of the axis that turns most. Raises JobError."""
     peek(path)
+    started = None
     if zipfile.is_zipfile(path):
         text = decode(member_of_zip(path, (".csv",), _MAX_CSV_BYTES, prefer="raw"))
+        started = _started(path)
         if text is None:
             raise JobError(f"{path}: the CSV in the archive is not text; export from phyphox again")
     elif path.read_bytes()[:2] == b"PK":
@@ -65,7 +69,23 @@ def read(path: Path) -> ThetaSeries:
         if others and max(others) > 0.3 * float(np.nanstd(table.columns[:, k])):
             turned = "The phone turned about more than one of its axes; hang it so that one axis lies across the swing."
             table.warnings.append(said("series.several_axes", turned))
-    return clean_series(t, theta, sigma, path=path, log=table.log, warnings=table.warnings, meta={"format": "phyphox"})
+    meta: dict[str, object] = {"format": "phyphox"}
+    if started is not None:
+        meta["recorded_on"] = started
+    return clean_series(t, theta, sigma, path=path, log=table.log, warnings=table.warnings, meta=meta)
+
+
+def _started(path: Path) -> date | None:
+    """The day of the recording out of meta/time.csv, in the phone's own time zone; None where the archive has none."""
+    with zipfile.ZipFile(path) as archive:
+        if "meta/time.csv" not in archive.namelist():
+            return None
+        with archive.open("meta/time.csv") as member:
+            found = _DAY.search(member.read(100_000).decode("utf-8", errors="replace"))
+    try:
+        return date.fromisoformat(found[1]) if found else None
+    except ValueError:
+        return None
 
 
 def _sigma_column(table: Table, names: tuple[str, ...], scale: float) -> np.ndarray | None:

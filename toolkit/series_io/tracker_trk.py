@@ -312,14 +312,18 @@ def _project(series: ThetaSeries) -> str:
     prop(2, "stepsize", "int", 1)
     prop(2, "stepcount", "int", int(frames[-1]) + 1)
     prop(2, "starttime", "double", repr(start_s * 1000))
+    prop(2, "readout", "string", "frame")
+    prop(2, "playallsteps", "boolean", "true")
     closed(1)
     opened(1, "clipcontrol", "object", media + "StepperClipControl")
+    prop(2, "rate", "double", 1.0)
     prop(2, "delta_t", "double", repr(step_s * 1000))
     prop(2, "frame", "int", 0)
     closed(1)
     opened(1, "coords", "object", media + "ImageCoordSystem")
     for name in ("fixedorigin", "fixedangle", "fixedscale"):
         prop(2, name, "boolean", "true")
+    prop(2, "locked", "boolean", "false")
     opened(2, "framedata", "array", f"[L{media}ImageCoordSystem$FrameData;")
     opened(3, "[0]", "object", media + "ImageCoordSystem$FrameData")
     for name, value in (("xorigin", x0), ("yorigin", y0), ("angle", 0.0), ("xscale", scale), ("yscale", scale)):
@@ -329,10 +333,18 @@ def _project(series: ThetaSeries) -> str:
     closed(1)
     prop(1, "length_unit", "string", "m")
     prop(1, "mass_unit", "string", "kg")
+    prop(1, "units_visible", "boolean", "true")
     opened(1, "tracks", "collection", "java.util.ArrayList")
     opened(2, "item", "object", _TRACKER + "PointMass")
     prop(3, "mass", "double", float(series.meta.get("mass_kg", 1.0)))
     prop(3, "name", "string", "mass A")
+    opened(3, "color", "object", "java.awt.Color")
+    for part, level in (("red", 255), ("green", 0), ("blue", 0), ("alpha", 255)):
+        prop(4, part, "int", level)
+    closed(3)
+    prop(3, "footprint", "string", "Footprint.Diamond")
+    prop(3, "visible", "boolean", "true")  # Tracker takes a missing one as false
+    prop(3, "trail", "boolean", "true")
     opened(3, "framedata", "array", f"[L{_TRACKER}PointMass$FrameData;")
     for frame, px, py in zip(frames, x.tolist(), y.tolist()):
         opened(4, f"[{frame}]", "object", _TRACKER + "PointMass$FrameData")
