@@ -87,13 +87,18 @@ def test_where_it_fails():
     assert equal == pytest.approx(3 * np.pi * 0.05 / (4 * 0.1 * 4.43), rel=0.15)
     assert 0 < drag["amplitude_above_rad"] < equal
     assert drag["t_stop_s"] < 60.0
+    assert found["linear_drag"].words_key == "linear_drag.fails"
+    always = verdicts(swing(theta0=0.8, alpha_d=0.002, beta=0.2, duration_s=20))["linear_drag"]
+    assert always.words_key == "linear_drag.fails.throughout"
+    assert "at every swing of this record" in always.sentence
 
 
 def test_friction_fails_at_small_swings():
     finding = verdicts(swing(theta0=0.6, alpha_d=0.02, mu=0.01, duration_s=40))["linear_drag"]
     assert finding.verdict == "fails"
     assert "amplitude_below_rad" in finding.where
-    assert finding.words_key == "linear_drag.fails.friction"
+    assert finding.words_key == "linear_drag.fails.friction.throughout"
+    assert "at every swing of this record" in finding.sentence
 
 
 def test_pivot_friction_fires():
@@ -170,3 +175,60 @@ def test_real_recordings(shared_data, name):
     assert 0 < found["small_angle"].where["amplitude_above_rad"] < 0.5
     reached = np.abs(theta[table[:, 0] < 100])
     assert 0 < found["linear_drag"].where["amplitude_above_rad"] < reached.max()
+
+
+def drifting_clock() -> ThetaSeries:
+    """The clock of yyz's second run in the extreme: its drift hides what the amplitude does to the period."""
+    series = swing(theta0=0.35, alpha_d=0.02, duration_s=60, fps=30, noise_rad=2e-3)
+    rate = 1 - (0.35 * np.exp(-0.02 * series.t_s)) ** 2 / 16  # steps of time that make every period alike
+    t = np.concatenate([[0.0], np.cumsum(rate[1:] * np.diff(series.t_s))])
+    return ThetaSeries(t, series.theta_rad, series.sigma_theta_rad)
+
+
+def test_small_angles_better_than_the_exact_equation_are_not_believed():
+    finding = verdicts(drifting_clock())["small_angle"]
+    assert finding.verdict == "not_distinguishable"
+    assert finding.words_key == "small_angle.contradicted"
+    assert abs(finding.evidence["period_growth_per_rad2"]) < 0.02
+
+
+def scaled() -> ThetaSeries:
+    return ThetaSeries(clean().t_s, clean().theta_rad * 1.03, clean().sigma_theta_rad)
+
+
+def late() -> ThetaSeries:
+    t = clean().t_s.copy()
+    t[1000:] += 0.02
+    return ThetaSeries(t, clean().theta_rad, clean().sigma_theta_rad)
+
+
+BREAKING = {
+    "clock": late,
+    "frictionless_pivot": lambda: swing(theta0=0.6, alpha_d=0.01, beta=0.01, mu=0.02, duration_s=40),
+    "geometry": scaled,
+    "linear_drag": lambda: swing(theta0=0.8, alpha_d=0.0, beta=0.1),
+    "no_drive": lambda: swing(**CLEAN, drive=(0.05, 0.31)),
+    "small_angle": lambda: swing(theta0=0.8),
+    "taut_string": lambda: swing(theta0=2.6, alpha_d=0.03),
+    "white_residuals": lambda: swing(**CLEAN, rho=0.9),
+}
+"""For each check a record that breaks its assumption; a new check needs its own here."""
+
+
+@functools.cache
+def small_verdicts():
+    return verdicts(swing(theta0=0.05, alpha_d=0.05, duration_s=40))
+
+
+def test_every_check_has_a_record_that_breaks_it():
+    assert set(check_names()) == set(BREAKING)
+
+
+@pytest.mark.parametrize("name", sorted(BREAKING))
+def test_a_check_fires_where_its_assumption_breaks_and_is_silent_where_it_holds(name):
+    finding = verdicts(BREAKING[name]())[name]
+    assert finding.verdict == "fails", finding.sentence
+    assert finding.remedy
+    assert finding.words_key.startswith(name)
+    silent = small_verdicts() if name in ("small_angle", "linear_drag") else clean_verdicts()
+    assert name not in silent or silent[name].verdict == "holds"

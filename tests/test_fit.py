@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ellipj, ellipk
 from synthetic_swing import swing
 
 from toolkit.errors import UsageError
 from toolkit.fit import choose_model, fit, fit_models
+from toolkit.fitting.descent import descend
+from toolkit.fitting.problem import pose
+from toolkit.fitting.solve import _verdict
 from toolkit.models import STANDARD
 from toolkit.scene import Environment, Pendulum, Scene
 from toolkit.series import ThetaSeries
@@ -334,3 +339,72 @@ def test_real_recordings(shared_data, name, t0, u):
     assert result.success
     assert result.derived["T0"].value == pytest.approx(t0, abs=4 * u)
     assert result.noise["inflation"] > 1.5
+
+
+@pytest.mark.parametrize(("points", "periods"), [(100, 1), (1500, 300), (100_000, 1000)])
+def test_from_a_hundred_to_a_hundred_thousand_points_over_one_to_a_thousand_periods(points, periods):
+    """Without drag, by SciPy's elliptic functions."""
+    peak, omega = 0.5, 4.43
+    modulus = math.sin(peak / 2) ** 2
+    quarter = ellipk(modulus)
+    t = np.linspace(0, periods * 4 * quarter / omega, points)
+    theta = 2 * np.arcsin(math.sin(peak / 2) * ellipj(omega * t + quarter, modulus)[0])
+    noisy = theta + 1e-3 * np.random.default_rng(5).normal(size=points)
+    result = fit(ThetaSeries(t, noisy, np.full(points, 1e-3)), fixed={"theta_offset": 0.0})
+    assert result.success, result.message
+    assert result.parameters["alpha_d"].value < 4 * result.parameters["alpha_d"].stderr + 1e-12
+    for name, truth in (("theta0", peak), ("phi", math.pi / 2), ("omega_g", omega)):
+        p = result.parameters[name]
+        assert abs(p.value - truth) < 5 * p.stderr, name
+
+
+def test_a_drives_derivatives_on_a_record_that_starts_late():
+    m, length = 0.25, 0.5
+    drive = {"f0_n": 0.15, "f_hz": 0.15, "phase_rad": 0.2}
+    scene = Scene(pendulum=Pendulum(m, length), effects={"cosine_drive": drive})
+    series = swing(duration_s=10)
+    late = ThetaSeries(series.t_s + 50.0, series.theta_rad, series.sigma_theta_rad)
+    problem = pose(late, scene, "full_linear_drag", ("f0", "f", "drive_phase", "length"))
+    values = {**problem.values, "k_d": 0.1, "theta0": 0.5, "phi": 1.0}
+    _, by, _ = problem.predict(values, problem.free)
+    for i, name in enumerate(problem.free):
+        up, down = (problem.predict({**values, name: values[name] + s * 1e-5}, ())[0] for s in (1, -1))
+        np.testing.assert_allclose(by[:, i], (up - down) / 2e-5, atol=1e-4 * (1 + np.abs(by[:, i]).max()), err_msg=name)
+
+
+def test_what_the_record_cannot_fix_is_named():
+    """The phase of a drive without force."""
+    drive = {"f0_n": 0.0, "f_hz": 0.2, "phase_rad": 0.0}
+    scene = Scene(pendulum=Pendulum(0.25, 0.5), effects={"cosine_drive": drive})
+    result = fit(swing(omega_g=OMEGA), scene, free=("drive_phase",))
+    assert not result.success
+    assert result.message.key == "fit.singular"
+    assert "drive_phase" in result.message
+    assert "simpler model" in result.message
+
+
+def test_two_motions_in_one_record_are_not_followed():
+    first, second = swing(theta0=0.5, duration_s=20), swing(theta0=0.5, duration_s=20, phi=-2.0, omega_g=7.0)
+    theta = np.concatenate([first.theta_rad[:600], second.theta_rad[600:]])
+    result = fit(ThetaSeries(first.t_s, theta, first.sigma_theta_rad))
+    assert not result.success
+    assert result.message.key == "fit.not_followed"
+    assert "--start" in result.message
+
+
+def test_a_drag_at_its_bound_is_said():
+    result = fit(swing(alpha_d=-0.001, duration_s=30))
+    assert result.success
+    assert result.parameters["alpha_d"].value == 0.0
+    assert [w.key for w in result.warnings] == ["fit.at_zero"]
+    assert result.warnings[0].values == {"name": "alpha_d"}
+
+
+def test_a_stuck_fit_is_said():
+    problem = pose(swing(duration_s=5), Scene(), "full_linear_drag")
+    begin = {**problem.values, "alpha_d": 0.02, "theta0": 0.5, "phi": 1.2, "omega_g": 4.43}
+    stuck = replace(descend(problem, begin), success=False)
+    done, message = _verdict(problem, stuck, problem.reduce(begin)[0], [])
+    assert not done
+    assert message.key == "fit.unsettled"
+    assert "start value" in message

@@ -11,7 +11,8 @@ from synthetic_swing import swing
 
 from toolkit.errors import UsageError
 from toolkit.fit import fit
-from toolkit.fitting.budget import Input, budget
+from toolkit.fitting.budget import Input, budget, budgets
+from toolkit.fitting.contour import contour
 from toolkit.fitting.uncertainty import bands, bootstrap, profile, sample_posterior, small_angle_bias
 from toolkit.scene import Pendulum, Scene
 from toolkit.series import ThetaSeries
@@ -133,3 +134,38 @@ def test_papers_k_d_beside_the_better_models():
     bias = small_angle_bias(fits, choose_model(fits))
     assert bias["preferred"] > 2 * 0.05 * 0.02
     assert set(bias) == {"paper", "paper_u", "preferred", "preferred_u", "difference_sigma"}
+
+
+def test_budgets_of_all_that_a_report_states():
+    inputs = {"mass": Input(2e-4, "rectangular"), "angle_scale": Input(0.01)}
+    drawn = budgets(fitted(), inputs=inputs)
+    assert {"k_d", "c", "theta0", "phi", "length", "T0", "Q"} <= set(drawn)
+    for name, one in drawn.items():
+        assert one.u == pytest.approx(math.hypot(one.u_statistical, one.u_systematic))
+        assert one == budget(fitted(), name, inputs)
+    mass = {name: next(r for r in one.rows if r.quantity == "mass") for name, one in drawn.items()}
+    assert mass["k_d"].sensitivity == pytest.approx(drawn["k_d"].estimate / 0.05, rel=1e-3)
+    assert abs(mass["T0"].contribution) < 1e-9
+    scale = next(r for r in drawn["theta0"].rows if r.quantity == "angle_scale")
+    assert scale.sensitivity == pytest.approx(drawn["theta0"].estimate, rel=0.15)
+
+
+def test_contour_is_the_profile_and_near_the_best_fit_the_ellipse():
+    result = fitted()
+    found = contour(result, "k_d", "c", reach=1.5, count=5)
+    best = {name: p.value for name, p in result.parameters.items()}
+    others = tuple(n for n in result.free if n not in ("k_d", "c"))
+    block = result.covariance[np.ix_(*[[result.free.index(n) for n in ("k_d", "c")]] * 2)]
+    least = result.problem.cost_at(best, ())
+    assert found.delta_chi2[2, 2] == pytest.approx(0, abs=1e-6)
+    for place in ((0, 2), (4, 2), (2, 0), (2, 4), (1, 3)):
+        at = {"k_d": found.first[place], "c": found.second[place]}
+        if not np.isfinite(found.delta_chi2[place]):
+            assert min(at.values()) < 0
+            continue
+        again = (result.problem.cost_at({**best, **at}, others) - least) / result.noise["inflation"] ** 2
+        assert found.delta_chi2[place] == pytest.approx(again, abs=0.02)
+        away = np.array([at["k_d"] - best["k_d"], at["c"] - best["c"]])
+        assert found.delta_chi2[place] == pytest.approx(away @ np.linalg.solve(block, away), rel=0.1)
+    with pytest.raises(UsageError, match="two free"):
+        contour(result, "k_d", "mass")

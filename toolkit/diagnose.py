@@ -5,9 +5,12 @@ Every finding names its sentence by `words_key`; `words_values` hold the numbers
     small_angle.fails                   amplitude_above_rad t_start_s t_stop_s amplitude_max_rad period_shift difference_rad sigmas
     small_angle.holds                   amplitude_max_rad period_shift amplitude_visible_rad difference_rad
     small_angle.not_distinguishable     the same, delta_chi2 omega_g_bias_sigma
+    small_angle.contradicted            delta_chi2 growth growth_u amplitude_max_rad
     small_angle.no_fit
     linear_drag.fails                   amplitude_above_rad share amplitude_max_rad visible_share sigmas [t_start_s t_stop_s]
+    linear_drag.fails.throughout        as linear_drag.fails: at every swing
     linear_drag.fails.friction          amplitude_below_rad share amplitude_min_rad visible_share sigmas [t_start_s t_stop_s]
+    linear_drag.fails.friction.throughout   as linear_drag.fails.friction: at every swing
     linear_drag.holds                   share_bound delta_chi2 amplitude_max_rad amplitude_min_rad
     linear_drag.not_distinguishable.little_decay, .noise
                                         delta_chi2 delta_chi2_quadratic_alone decay

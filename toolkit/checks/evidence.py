@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -79,25 +80,17 @@ class Evidence:
         own correlation does not count against it.
         """
         best = self.best
-        values = {name: p.value for name, p in best.parameters.items()}
-        _, by, _ = best.problem.predict(values, best.free)
-        weight = 1 / self.sigma_rad
-        basis = _basis(by * weight[:, None])
-        own = columns * weight[:, None]
-        own = own - basis @ (basis.T @ own)
+        own, residual = self._beside_the_fit(columns)
         size = np.linalg.norm(own, axis=0)
         size = np.where(size > 0, size, np.inf)
         gram = (own / size).T @ (own / size)
-        residual = best.residuals_rad * weight
-        residual = residual - basis @ (basis.T @ residual)
         inverse = np.linalg.pinv(gram, rcond=1e-10)
         coefficient = inverse @ ((own / size).T @ residual)
         left = residual - (own / size) @ coefficient
-        reduced, _ = best.problem.reduce(values)
         step = float(np.median(np.diff(self.series.t_s)))
         known = self.series.sigma_theta_rad is not None
         count = len(best.free) + columns.shape[1]
-        noise = measure_noise(left, self.sigma_rad, known, reduced["omega_g"], step, count)
+        noise = measure_noise(left, self.sigma_rad, known, omega_g_of(best), step, count)
         inflation2 = max(noise.inflation**2, 1e-30)
         gain = float(residual @ residual - left @ left) / inflation2
         u = np.sqrt(np.diag(inverse) * inflation2) / size
@@ -122,16 +115,27 @@ class Evidence:
 
     def step_gain(self, columns: np.ndarray) -> np.ndarray:
         """(k,) χ² that each of `columns` (n, k) alone would take from the best fit, not yet corrected for the noise."""
-        best = self.best
-        values = {name: p.value for name, p in best.parameters.items()}
-        _, by, _ = best.problem.predict(values, best.free)
-        weight = 1 / self.sigma_rad
-        basis = _basis(by * weight[:, None])
-        own = columns * weight[:, None]
-        own = own - basis @ (basis.T @ own)
+        own, residual = self._beside_the_fit(columns)
         size2 = np.sum(own**2, axis=0)
-        good = size2 > 1e-9 * np.sum((columns * weight[:, None]) ** 2, axis=0)
-        return np.where(good, (own.T @ (best.residuals_rad * weight)) ** 2 / np.where(good, size2, 1.0), 0.0)
+        good = size2 > 1e-9 * np.sum((columns / self.sigma_rad[:, None]) ** 2, axis=0)
+        return np.where(good, (own.T @ residual) ** 2 / np.where(good, size2, 1.0), 0.0)
+
+    def _beside_the_fit(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Columns (n, k) and residuals (n,) over σ, less what the best fit's own parameters can do."""
+        weight = 1 / self.sigma_rad
+        basis = self._span
+        own, residual = columns * weight[:, None], self.best.residuals_rad * weight
+        return own - basis @ (basis.T @ own), residual - basis @ (basis.T @ residual)
+
+    @cached_property
+    def _span(self) -> np.ndarray:
+        """Orthonormal columns that span what the best fit's parameters can do, over σ."""
+        best = self.best
+        _, by, _ = best.problem.predict({name: p.value for name, p in best.parameters.items()}, best.free)
+        jacobian = by / self.sigma_rad[:, None]
+        size = np.linalg.norm(jacobian, axis=0)
+        u, s, _ = np.linalg.svd(jacobian[:, size > 0] / size[size > 0], full_matrices=False)
+        return np.asarray(u[:, s > 1e-7 * s[0]])
 
 
 @dataclass(frozen=True)
@@ -142,13 +146,6 @@ class Added:
     coefficients: np.ndarray
     sigmas: np.ndarray
     noise: Noise
-
-
-def _basis(jacobian: np.ndarray) -> np.ndarray:
-    """Orthonormal columns that span what the fit's own parameters can do."""
-    size = np.linalg.norm(jacobian, axis=0)
-    u, s, _ = np.linalg.svd(jacobian[:, size > 0] / size[size > 0], full_matrices=False)
-    return np.asarray(u[:, s > 1e-7 * s[0]])
 
 
 def omega_g_of(result: FitResult) -> float:

@@ -107,9 +107,11 @@ def _fails(
         threshold = min(max(loss.amplitude_of_share(visible), float(np.min(amplitude))), largest)
         inside = amplitude >= threshold
         where = {"amplitude_above_rad": threshold, "amplitude_equal_loss_rad": loss.amplitude_of_share(0.5)}
+        throughout = bool(inside.all())
+        there = "at every swing of this record" if throughout else _angle("above", threshold)
         sentence = (
-            f"Linear drag fails ({strength:.0f} sigma): above {threshold:.3g} rad ({math.degrees(threshold):.2g}°) more than "
-            f"{100 * visible:.2g} % of the energy loss goes as v²; at the largest swing, {largest:.3g} rad, it is {100 * quadratic:.0f} %."
+            f"Linear drag fails ({strength:.0f} sigma): {there} more than {100 * visible:.2g} % of the energy loss goes as v²; "
+            f"at the largest swing, {largest:.3g} rad, it is {100 * quadratic:.0f} %."
         )
         key, remedy = "linear_drag.fails", "use the model with linear and quadratic drag"
         values = {
@@ -124,10 +126,11 @@ def _fails(
         threshold = min(loss.amplitude_of_friction_share(visible), largest)
         inside = amplitude <= threshold
         where = {"amplitude_below_rad": threshold}
+        throughout = bool(inside.all())
+        there = "at every swing of this record" if throughout else _angle("below", threshold)
         sentence = (
-            f"Linear drag fails ({strength:.0f} sigma): below {threshold:.3g} rad ({math.degrees(threshold):.2g}°) more than "
-            f"{100 * visible:.2g} % of the energy loss is friction at the pivot, which does not depend on speed; at the smallest swing it is "
-            f"{100 * friction:.0f} %."
+            f"Linear drag fails ({strength:.0f} sigma): {there} more than {100 * visible:.2g} % of the energy loss is friction at "
+            f"the pivot, which does not depend on speed; at the smallest swing it is {100 * friction:.0f} %."
         )
         key, remedy = (
             "linear_drag.fails.friction",
@@ -151,9 +154,13 @@ def _fails(
         sentence=sentence,
         remedy=remedy,
         strength_sigma=strength,
-        words_key=key,
+        words_key=f"{key}.throughout" if throughout else key,
         words_values=values,
     )
+
+
+def _angle(side: str, threshold: float) -> str:
+    return f"{side} {threshold:.3g} rad ({math.degrees(threshold):.2g}°)"
 
 
 class _Loss:

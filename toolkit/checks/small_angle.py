@@ -9,11 +9,13 @@ import numpy as np
 from toolkit.checks.evidence import FAILS_BELOW_P, Evidence, omega_g_of, sigmas
 from toolkit.checks.finding import FAILS, HOLDS, NOT_DISTINGUISHABLE, Finding
 from toolkit.fit import FitResult, fit
+from toolkit.fitting.cycles import cycles
 from toolkit.scene import Scene
 from toolkit.series import ThetaSeries
 
 _HARMLESS_SHIFT = 1e-3
 _CLEAR = 25.0
+_CONTRADICTED = 16.0
 _POINTS = 1200
 
 
@@ -56,6 +58,26 @@ def check(evidence: Evidence) -> Finding:
     }
     if small.success:
         numbers["omega_g_bias_sigma"] = (omega_g_of(small) - omega) / u_omega if u_omega else 0.0
+    over = (
+        gain * evidence.inflation2 / float(small.noise["inflation"]) ** 2 if small.success else 0.0
+    )  # by its own noise
+    growth, u_growth = _period_growth(evidence, full) if over < -_CONTRADICTED else (None, math.inf)
+    if growth is not None:
+        numbers |= {"period_growth_per_rad2": growth, "period_growth_u": u_growth}
+        return Finding(
+            "small_angle",
+            NOT_DISTINGUISHABLE,
+            evidence=numbers,
+            sentence=(
+                f"The small-angle model fits better than the exact equation (Δχ² = {over:.0f}), which no pendulum of one length can "
+                f"do: measured cycle by cycle the period grows by {growth:.3f} ± {u_growth:.3f} a rad² of amplitude, not by 1/16. The "
+                "clock or the length changes along the record, or the angles are out of scale."
+            ),
+            remedy="look at the checks of clock and geometry, and at a string that slips or rubs at its support",
+            strength_sigma=math.sqrt(-over),
+            words_key="small_angle.contradicted",
+            words_values={"delta_chi2": over, "growth": growth, "growth_u": u_growth, "amplitude_max_rad": largest},
+        )
     strength = sigmas(p_value)
     if p_value < FAILS_BELOW_P:
         above = min(threshold, largest)
@@ -119,6 +141,21 @@ def check(evidence: Evidence) -> Finding:
         words_key="small_angle.not_distinguishable",
         words_values={**values, "delta_chi2": gain, "omega_g_bias_sigma": hidden},
     )
+
+
+def _period_growth(evidence: Evidence, full: FitResult) -> tuple[float | None, float]:
+    """C of T = T₀ (1 + C A²) through the measured periods, and its u by their scatter; None with fewer than ten."""
+    found = cycles(evidence.series, full)
+    if found.t_s.size < 10:
+        return None, math.inf
+    columns = (
+        np.stack([np.ones_like(found.amplitude_rad), found.amplitude_rad**2], axis=1) / found.sigma_period_s[:, None]
+    )
+    inverse = np.linalg.pinv(columns.T @ columns)
+    start, slope = inverse @ (columns.T @ (found.period_s / found.sigma_period_s))
+    left = found.period_s / found.sigma_period_s - columns @ [start, slope]
+    scatter2 = float(left @ left) / (found.t_s.size - 2)
+    return float(slope / start), math.sqrt(float(inverse[1, 1]) * scatter2) / float(start)
 
 
 def _p_value(gain: float) -> float:

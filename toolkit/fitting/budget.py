@@ -7,7 +7,7 @@ k = t_p(ν_eff). Sensitivities of what the fit holds or assumes are found by fit
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,19 +75,34 @@ class Budget:
     level: float
 
 
+MAIN = (
+    *("k_d", "alpha_d", "c", "beta", "torque", "mu", "theta0", "phi", "omega_g", "length"),
+    *("T0", "equivalent_length", "g_from_length", "Q"),
+)
+"""What a report of an experiment states, where the fit has it."""
+
+
 def budget(
     result: FitResult, quantity: str = "k_d", inputs: Mapping[str, Input] | None = None, level: float = 0.95
 ) -> Budget:
-    """The budget of a fitted or derived quantity (`k_d`, `omega_g`, `T0`, `equivalent_length` …).
+    """The budget of a fitted or derived quantity (`k_d`, `omega_g`, `T0`, `equivalent_length` …); see `budgets`."""
+    return budgets(result, (quantity,), inputs, level)[quantity]
+
+
+def budgets(
+    result: FitResult,
+    quantities: Sequence[str] | None = None,
+    inputs: Mapping[str, Input] | None = None,
+    level: float = 0.95,
+) -> dict[str, Budget]:
+    """Budgets of several quantities, by default of all of `MAIN` that the fit has with an uncertainty; each input is moved
+    once for all of them.
 
     inputs : of mass, length, g, bob_radius, angle_scale, time_scale, vertical. Nuisance parameters that the fit itself
     freed within a prior get their row from the fit. Raises UsageError for unknown names or a fit that failed.
     """
-    from scipy.stats import t as student
-
     if result.problem is None or not np.all(np.isfinite(result.covariance)):
         raise UsageError(f"the fit of {result.model} failed ({result.message}); there is no budget to draw up")
-    at = _value(result, quantity)
     inputs = dict(inputs or {})
     for name, told in inputs.items():
         if name not in _INPUTS:
@@ -96,52 +111,45 @@ def budget(
             raise UsageError(f"input {name} needs a positive width and one of {', '.join(DISTRIBUTIONS)}")
         if name in result.problem.priors:
             raise UsageError(f"{name} is already free within a prior in this fit; leave it out of the inputs")
-    priors = result.problem.priors
+    table = {**result.parameters, **result.derived}
+    if quantities is None:
+        quantities = [name for name in MAIN if name in table and table[name].stderr]
+    ends = {name: _with_input_moved(result, name, told.u) for name, told in inputs.items()}
+    inverse = result.problem.normal_inverse(result)
+    return {name: _budget(result, name, inputs, ends, inverse, level) for name in quantities}
+
+
+def _budget(
+    result: FitResult,
+    quantity: str,
+    inputs: Mapping[str, Input],
+    ends: Mapping[str, tuple[FitResult, FitResult]],
+    inverse: np.ndarray,
+    level: float,
+) -> Budget:
+    from scipy.special import stdtrit
+
+    at, problem = _value(result, quantity), result.problem
     gradient = _gradient(result, quantity)
-    total2 = float(gradient @ result.covariance @ gradient)
     rows = []
-    prior2 = 0.0
-    for name, (mean, u) in priors.items():
-        i = result.free.index(name)
-        pull = result.problem.prior_weight**2 / u**2
-        sensitivity = float(gradient @ result.problem.normal_inverse(result)[:, i]) * pull
-        rows.append(
-            Row(
-                name,
-                mean,
-                _INPUTS.get(name, result.parameters[name].unit),
-                u,
-                "B",
-                "normal",
-                sensitivity,
-                sensitivity * u,
-                math.inf,
-            )
-        )
-        prior2 += (sensitivity * u) ** 2
-    statistical = math.sqrt(max(total2 - prior2, 0.0))
+    for name, (mean, u) in problem.priors.items():
+        unit = _INPUTS.get(name, result.parameters[name].unit)
+        by = float(gradient @ inverse[:, result.free.index(name)]) * problem.prior_weight**2 / u**2
+        rows.append(Row(name, mean, unit, u, "B", "normal", by, by * u, math.inf))
+    prior2 = sum(row.contribution**2 for row in rows)
+    statistical = math.sqrt(max(float(gradient @ result.covariance @ gradient) - prior2, 0.0))
     dof = max(float(result.noise["effective_points"]) - len(result.free), 1.0)
     rows.insert(0, Row("scatter of the points", at.value, at.unit, statistical, "A", "normal", 1.0, statistical, dof))
     for name, told in inputs.items():
-        sensitivity = _sensitivity(result, quantity, name, told.u)
-        rows.append(
-            Row(
-                name,
-                _estimate(result, name),
-                _INPUTS[name],
-                told.u,
-                "B",
-                told.distribution,
-                sensitivity,
-                sensitivity * told.u,
-                told.dof,
-            )
-        )
+        up, down = (_value(end, quantity).value for end in ends[name])
+        by = (up - down) / (2 * told.u)
+        estimate = _estimate(result, name)
+        rows.append(Row(name, estimate, _INPUTS[name], told.u, "B", told.distribution, by, by * told.u, told.dof))
     systematic = math.sqrt(sum(row.contribution**2 for row in rows if row.kind == "B"))
     u = math.hypot(statistical, systematic)
     fourth = sum(row.contribution**4 / row.dof for row in rows if row.dof > 0)
     effective = u**4 / fourth if fourth > 0 else math.inf
-    factor = float(student.ppf(0.5 + level / 2, min(effective, 1e9)))
+    factor = float(stdtrit(min(effective, 1e9), 0.5 + level / 2))
     return Budget(
         quantity, at.value, at.unit, tuple(rows), statistical, systematic, u, effective, factor, factor * u, level
     )
@@ -179,12 +187,9 @@ def _estimate(result: FitResult, name: str) -> float:
     return float(known)
 
 
-def _sensitivity(result: FitResult, quantity: str, name: str, u: float) -> float:
+def _with_input_moved(result: FitResult, name: str, u: float) -> tuple[FitResult, FitResult]:
+    """The fit again with an input one u higher, and one u lower."""
     _estimate(result, name)
-    ends = []
-    for sign in (1, -1):
-        moved = result.problem.with_input(name, sign * u)
-        start = {n: p.value for n, p in result.parameters.items() if not p.fixed}
-        again = moved.solve(start, thorough=False)
-        ends.append(_value(again, quantity).value)
-    return (ends[0] - ends[1]) / (2 * u)
+    start = {n: p.value for n, p in result.parameters.items() if not p.fixed}
+    up, down = (result.problem.with_input(name, sign * u).solve(start, thorough=False) for sign in (1, -1))
+    return up, down

@@ -182,7 +182,8 @@ def _covariance(problem: Problem, jacobian: np.ndarray, noise: Noise) -> tuple[n
     """(k, k) covariance that allows for the noise and the priors, and the names that the record cannot fix."""
     size = np.linalg.norm(jacobian, axis=0)
     prior = problem.prior_precision()
-    scale = 1 / np.sqrt(size**2 + prior)
+    with np.errstate(divide="ignore"):
+        scale = 1 / np.sqrt(size**2 + prior)
     blind = [name for name, s in zip(problem.free, scale) if not math.isfinite(s)]
     if blind:
         return np.full((len(problem.free), len(problem.free)), np.nan), blind
