@@ -39,7 +39,7 @@ from toolkit.render import stage
 
 # Which warnings (by the key of their sentence) are about which error.
 ABOUT: dict[str, frozenset[str]] = {
-    "position": frozenset({"track.strays", "track.few"}),
+    "position": frozenset({"track.strays", "track.few", "track.poor_picture"}),
     "zero": frozenset({"track.strays", "calibrate.wide", "track.grows"}),
     "scale": frozenset({"track.strays", "calibrate.wide"}),
     "rest": frozenset({"track.strays", "track.grows", "track.clock_slips", "track.leaps", "video.backwards"}),

@@ -20,7 +20,7 @@ from toolkit.tracking.clock import even_times, out_of_time, place_lost_frames
 from toolkit.tracking.follow import Follower
 from toolkit.tracking.scatter import Factors, true_sigma
 from toolkit.tracking.shake import Shake
-from toolkit.tracking.swing import Swing, fit_swing
+from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.tracking.verdict import poor_motion, require_pendulum
 from toolkit.tracking.view import Lines, View, fit_view
 from toolkit.video import Frame, Video, clock_warnings, open_video
@@ -28,6 +28,8 @@ from toolkit.video import Frame, Video, clock_warnings, open_video
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
 
 
+_CALM = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}  # damping of a pendulum of which little is known yet
+_POOR_PICTURE = 0.2  # of the contrast
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
 
 
@@ -261,6 +263,17 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + sigma**2)[good])))
     motion = swing if view is None else view.swing(fps_factor)
     warnings += poor_motion(motion, t, good, rms_px, typical)
+    misfit = float(np.median([p.misfit for p, g in zip(r.place, good) if g])) / max(abs(follower.look.contrast), 1.0)
+    if misfit > _POOR_PICTURE:
+        warnings.append(
+            said(
+                "track.poor_picture",
+                "the bob does not look like an even disc (a pattern, a highlight or a shadow: {share:.0%} of its contrast is not "
+                "explained); its centre may be off by about {off_px:.1f} px, much of it the same on all frames",
+                share=misfit,
+                off_px=misfit * follower.look.radius_px / 3,
+            )
+        )
     for odd in clock_warnings(stamps, video):  # what the stamps account for affects no result
         (log if getattr(odd, "key", "") in _HARMLESS else warnings).append(odd)
     status = np.where(good, OK, LOST).astype("U9")
@@ -339,27 +352,42 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
 
 
 def _whole_swing(start: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray, path: Path) -> Swing:
-    """The motion over the whole clip, fitted in growing pieces, so that no swing is lost count of."""
+    """The motion over the whole clip, from the motion followed; where that does not lead there, from the places alone."""
     chosen = np.flatnonzero(good)
     theta, rate = start.angle(t[chosen[:1]])
     values = start.values.copy()
     values[7:] = theta[0], rate[0]
+    swing = _grown_swing(values, t, x, y, chosen)
+    if swing is None or swing.rms_px > 0.02 * np.hypot(np.ptp(x[chosen]), np.ptp(y[chosen])):
+        first = chosen[t[chosen] < t[chosen[0]] + 1.5 * start.period_s]
+        other = start_swing(t[first], x[first], y[first]) if first.size >= 12 else None
+        anew = None if other is None else _grown_swing(other, t, x, y, chosen)
+        if anew is not None and (swing is None or anew.rms_px < swing.rms_px):
+            swing = anew
+    if swing is None:
+        raise JobError(f"what moves in {path} does not swing like a pendulum; if there is one, {REMEDY}")
+    return swing
+
+
+def _grown_swing(values: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> Swing | None:
+    """The motion through the `chosen` frames, fitted in growing pieces, so that no swing is lost count of."""
     swing: Swing | None = None
-    stop = t[chosen[0]] + max(0.75 * start.period_s, 0.3)
+    period = 2 * np.pi / np.sqrt(max(values[4], 1e-9))
+    stop = t[chosen[0]] + max(0.75 * period, 0.3)
     while True:
         part = chosen[t[chosen] <= stop]
         if part.size >= 12:
             p = part[:: max(1, part.size // 1500)]
-            swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.1), values)
+            calm = _CALM if stop < t[-1] else None
+            swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=calm)
+            if swing is None and calm is None:
+                swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=_CALM)
             if swing is None:
-                break
+                return None
             values = swing.values
         if stop >= t[-1]:
-            break
+            return swing
         stop = t[chosen[0]] + 2 * (stop - t[chosen[0]])
-    if swing is None:
-        raise JobError(f"what moves in {path} does not swing like a pendulum; if there is one, {REMEDY}")
-    return swing
 
 
 def _at_first_measured(swing: Swing, t: np.ndarray, good: np.ndarray, fps_factor: float) -> list[float]:

@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.errors import JobError, UsageError
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.search import Hypothesis, even_light, find_round_movers
+from toolkit.tracking.search import Hypothesis, even_light, find_round_movers, find_round_near
 from toolkit.tracking.sight import LUMA, Sight, best_sight, small_planes
 from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.video import Frame
@@ -130,13 +130,14 @@ def _follow(
         return True
 
     def look_around(i: int, x: float, y: float) -> bool:
-        """The frame next to the first may show the bob some diameters away: the nearest like it that can be found."""
-        for reach in (1.2, 2.4, 3.6):
-            for a in np.arange(0.0, 2 * np.pi, np.pi / 4 if reach < 2 else np.pi / 6):
-                far = reach * look.radius_px
-                if take(i, Guess(x + far * float(np.cos(a)), y + far * float(np.sin(a)))):
-                    return True
-        return False
+        """Not where it should be: the outline of its size that gathers most votes within some diameters."""
+        patch = cut(batch[i], sight, x, y, 5.5 * look.radius_px + 4)
+        if patch is None:
+            return False
+        found = find_round_near(patch.image, look.radius_px, 1 if look.contrast > 0 else -1, look.edge_px)
+        if found is None or found[2] < 0.5:
+            return False
+        return take(i, Guess(found[0] + patch.x_px, found[1] + patch.y_px))
 
     for way in (1, -1):
         recent = [(batch[start].t_s, x, y)]
@@ -146,7 +147,7 @@ def _follow(
             if i in repeated:
                 i += way
                 continue
-            if take(i, Guess(*extrapolate(recent, batch[i].t_s))) or (len(recent) == 1 and look_around(i, x, y)):
+            if take(i, Guess(*extrapolate(recent, batch[i].t_s))) or look_around(i, *recent[-1][1:]):
                 recent = [*recent, (batch[i].t_s, *points[i])][-3:]
                 misses = 0
             else:
@@ -189,7 +190,9 @@ def _swing_of(batch: list[Frame], points: dict[int, tuple[float, float]], look: 
         return None  # it does not move
     start = start_swing(t, x, y)
     swing = None if start is None else fit_swing(t, x, y, np.full(t.size, 0.3), start)
-    if swing is None or swing.rms_px > max(0.05 * extent, 0.5):
+    # a hand-held camera adds its own wandering: what is left when that is taken away is judged later
+    wandering = 0.12 if len(points) > 0.9 * len(batch) else 0.05
+    if swing is None or swing.rms_px > max(wandering * extent, 0.5):
         return None
     return swing
 
@@ -229,7 +232,7 @@ def flat_fit(
 
 def cut(frame: Frame, sight: Sight, x: float, y: float, half: float) -> Patch | None:
     """The patch of ±half px about (x, y), as far as it lies in the picture (`back` and `seen` are yet to be set)."""
-    if not (np.isfinite(x) and np.isfinite(y)):
+    if not np.isfinite(x + y + half):
         return None
     height, width = frame.luma.shape
     x0, x1 = max(0, int(x - half)), min(width, int(x + half) + 2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field, replace
+from math import cos, hypot, isfinite, sin
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.tracking.acquire import Rough, cut
 from toolkit.tracking.background import Background
+from toolkit.tracking.search import find_round_near
 from toolkit.tracking.stillness import STILL, Anchors, CameraShift
 from toolkit.tracking.string_line import measure_string
 from toolkit.tracking.swing import Swing, fit_swing
@@ -68,6 +70,7 @@ class Follower:
         self._learn_background(batch, rough.look, points)
         self.look, self.exposure_s = self._learn_looks(batch, rough.look, points, radius)
         self.ordinary_misfit = self.look.noise
+        self.ordinary_visible = 0.85
         self.localiser: Localiser = self._choose(batch, points, wanted)
 
     # --- learning -------------------------------------------------------------------------------------------------
@@ -139,20 +142,36 @@ class Follower:
         numbers = np.array(list(points))
         vx, vy = self.swing.velocity(np.array([batch[i].t_s for i in numbers]))
         speed = np.hypot(vx, vy)
+        found_px = look.radius_px
+        # what else there is beside the bob (a shadow) must stand out as none of it, or it is fitted too
+        look = look._replace(noise=min(look.noise, 0.05 * abs(look.contrast) + 1.0))
 
         def fit(k: int, look: Look, part: float, **how: bool | int) -> np.ndarray | None:
             i = numbers[k]
             guess = self._guess(*points[i], part * vx[k], part * vy[k])
             patch = self._patch(batch[i], look, guess)
-            return None if patch is None else fit_disc(patch, look, guess, **how)  # type: ignore[arg-type]
+            if patch is None:
+                return None
+            quiet.append(1.4826 * float(np.median(np.abs(patch.image - patch.back))))
+            out = fit_disc(patch, look, guess, **how)  # type: ignore[arg-type]
+            if out is not None and how.get("calibrate") and not radius:
+                # half out of the picture, or a shadow taken for a part of it: no size to learn from
+                x, y, size = out[0] + patch.x_px, out[1] + patch.y_px, float(out[2])
+                rim = min(x, y, self.shape[1] - 1 - x, self.shape[0] - 1 - y)
+                if rim < size + 2 or not 0.8 < size / found_px < 1.25:
+                    return None
+            return out
 
+        quiet: list[float] = []  # the wall's own noise
         exposure = 0.0
         xs_middle = float(np.median([p[0] for p in points.values()]))
         for _ in range(2):  # the streak widens the edge, the edge shortens the streak
-            slow = np.argsort(speed)[: max(8, numbers.size // 4)][:16]
+            slow = np.argsort(speed)[: max(8, numbers.size // 4)]
+            slow = slow[:: max(1, slow.size // 16)][:16]
             found = [fit(k, look, exposure, calibrate=True, turns=8) for k in slow]
             fits = [f for f in found if f is not None]
-            if look.even and fits and np.nanmedian([f[13] / f[7] for f in fits]) > 1.5:
+            drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(quiet or [0.0]))  # more misfit than noise leaves
+            if look.even and fits and np.median([f[13] for f in fits]) > drawn:
                 look = look._replace(even=False)  # a pattern or a highlight: the outline alone counts
                 found = [fit(k, look, exposure, calibrate=True, turns=8) for k in slow]
                 fits = [f for f in found if f is not None]
@@ -168,6 +187,10 @@ class Follower:
                     )
                     change = abs(sizes[left].mean() - sizes[~left].mean())
                     look = look._replace(radius_free=bool(change > max(0.05, 4 * spread)))
+            if (
+                not look.even and look.noise > drawn
+            ):  # a pattern up to the outline: size and streak cannot be told by it
+                return look._replace(radius_free=False), 0.0
             if speed.max() * self.interval_s < 1.0:
                 break
             fast = np.argsort(-speed)[:6]
@@ -203,15 +226,17 @@ class Follower:
                 guess = self._guess(*points[i], float(vx[k]), float(vy[k]))
                 patch = self._patch(batch[i], self.look, guess)
                 place = NOWHERE if patch is None else candidate.locate(patch, self.look, guess)
-                if np.isfinite(place.x_px) and place.visible > 0.8:
-                    found.append((batch[i].t_s, place.x_px, place.y_px, place.misfit))
+                if np.isfinite(place.x_px) and place.visible > 0.6:
+                    found.append((batch[i].t_s, place.x_px, place.y_px, place.misfit, place.visible))
             if len(found) < max(10, 0.5 * len(points)):
                 continue
-            t, x, y, misfit = np.array(found).T
+            t, x, y, misfit, visible = np.array(found).T
             swing = fit_swing(t, x, y, np.full(t.size, 0.1), _restarted(self.swing, t[0]))
             if swing is not None and swing.rms_px * (0.9 if name == "disc" else 1.0) < least:
                 best, least = candidate, swing.rms_px * (0.9 if name == "disc" else 1.0)
                 self.ordinary_misfit = float(np.percentile(misfit, 90))
+                # a rolling shutter shears the outline where the bob is fast: what is ordinary is not hidden
+                self.ordinary_visible = float(np.clip(np.percentile(visible, 25) - 0.05, 0.65, 0.85))
                 self.swing = swing
         return best
 
@@ -268,16 +293,19 @@ class Follower:
         if len(self.recent) < 3 and frame.index in self._found:
             x, y = self._found[frame.index]  # the motion fitted to the start may be poor at its rim
         guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
-        patch = self._patch(frame, self.look, guess)
+        repeated = self._is_repeat(frame)
+        patch = None if repeated else self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)
         ok = self._believe(place, x, y)
+        if not ok and not repeated:
+            place, patch, ok = self._look_around(frame, guess, place, patch)
         r = self.record
         r.index.append(frame.index)
         r.t_s.append(frame.t_s)
         r.place.append(place)
         r.ok.append(ok)
         r.shift.append(shift if self.shaking else None)
-        r.repeated.append(self._is_repeat(frame))
+        r.repeated.append(repeated)
         if ok and patch is not None:
             self._remember(frame, place)
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
@@ -285,7 +313,7 @@ class Follower:
             self._update_background(patch, place, guess)
             if len(r.index) % _STRING_EVERY == 1:
                 self._measure_string(frame, place, shift)
-        else:
+        elif not repeated:
             self.hidden += 1
             if self.hidden == 2:
                 self._refit()
@@ -304,19 +332,45 @@ class Follower:
         near = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
         return self.localiser.locate(patch, self.look, near)
 
+    def _look_around(
+        self, frame: Frame, guess: Guess, place: Place, patch: Patch | None
+    ) -> tuple[Place, Patch | None, bool]:
+        """Not where it should be: the bob's outline within some radii of there, the wider the longer it was not seen."""
+        look = self.look
+        reach = min(6.0, 1.0 + 0.5 * self.hidden) * look.radius_px + 4
+        wide = self._patch(frame, look._replace(radius_px=look.radius_px + reach / 1.25), guess)
+        if wide is None:
+            return place, patch, False
+        sign = 1 if look.contrast > 0 else -1
+        found = find_round_near(wide.image - wide.back, look.radius_px, sign, look.edge_px)
+        if found is None or found[2] < 0.6:
+            return place, patch, False
+        near = guess._replace(x_px=found[0] + wide.x_px, y_px=found[1] + wide.y_px)
+        close = self._patch(frame, look, near)
+        if close is None:
+            return place, patch, False
+        other = self._locate(close, near)
+        px, py = self.pivot or self.swing.pivot_px
+        off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - np.hypot(guess.x_px - px, guess.y_px - py))
+        if self._believe(other, near.x_px, near.y_px) and off_arc < 0.5 * look.radius_px + 2:
+            return other, close, True
+        return place, patch, False
+
     def _believe(self, place: Place, x: float, y: float) -> bool:
         look = self.look
         if not np.isfinite(place.x_px):
             return False
         ratio = place.contrast / look.contrast
         shade = abs(place.contrast + place.wall - self._shade)
-        if np.isnan(shade) or self.hidden > 15:
+        if np.isnan(place.wall):  # a localiser for bobs with a pattern, which show now this side, now that
+            bright = 0.25 < ratio < 4.0
+        elif np.isnan(shade) or self.hidden > 15:
             bright = 0.5 < ratio < 2.0
         else:  # before something of another shade the contrast is another, but the bob is as bright as ever
             bright = 0.3 < ratio < 2.5 and shade < 0.1 * abs(look.contrast) + 3 * self._shade_scatter
         return bool(
             bright
-            and place.visible >= 0.85
+            and place.visible >= self.ordinary_visible
             and place.misfit < 2 * self.ordinary_misfit + 0.03 * abs(look.contrast)
             and np.hypot(place.x_px - x, place.y_px - y) < 0.6 * look.radius_px + 2
         )
@@ -345,12 +399,15 @@ class Follower:
             if r.ok[k]:
                 self.recent.append((frame.t_s, r.place[k].x_px, r.place[k].y_px))
                 self.hidden = 0
-            elif self.recent:
+            elif self.recent and not r.repeated[k]:
                 x, y, vx, vy = self._expect(frame.t_s)
                 guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
                 patch = self._patch(frame, self.look, guess)
                 place = NOWHERE if patch is None else self._locate(patch, guess)
-                if self._believe(place, x, y):
+                ok = self._believe(place, x, y)
+                if not ok:
+                    place, patch, ok = self._look_around(frame, guess, place, patch)
+                if ok:
                     r.place[k], r.ok[k] = place, True
                     self._remember(frame, place)
                 else:
@@ -363,12 +420,14 @@ class Follower:
         recent = list(self.recent)[-2:]
         if recent and abs(t - self.swing.t0_s) > 1.0:  # start anew from near by, so that no long way is integrated
             self.swing = replace(self.swing, values=_restarted(self.swing, recent[-1][0]), t0_s=recent[-1][0])
-        theta, rate = self.swing.angle(np.array([*(r[0] for r in recent), t]))
-        v = self.swing.values
-        direction = theta + v[3]
-        xs, ys = v[0] + v[2] * np.sin(direction), v[1] + v[2] * np.cos(direction)
-        x, y = float(xs[-1]), float(ys[-1])
-        vx, vy = (float(v[2] * rate[-1] * f) for f in (np.cos(direction[-1]), -np.sin(direction[-1])))
+        v = self.swing.values.tolist()
+        theta, rate = (a.tolist() for a in self.swing.angle(np.array([*(r[0] for r in recent), t])))
+        if not isfinite(sum(theta) + rate[-1]):  # a motion fitted to too little may run away
+            x, y = recent[-1][1:] if recent else v[:2]
+            return x, y, 0.0, 0.0
+        xs, ys = [v[0] + v[2] * sin(a + v[3]) for a in theta], [v[1] + v[2] * cos(a + v[3]) for a in theta]
+        x, y = xs[-1], ys[-1]
+        vx, vy = v[2] * rate[-1] * cos(theta[-1] + v[3]), -v[2] * rate[-1] * sin(theta[-1] + v[3])
         if not recent:
             return x, y, vx, vy
         offs = [(r[1] - a, r[2] - b) for r, a, b in zip(recent, xs, ys)]
@@ -376,7 +435,7 @@ class Follower:
         if len(recent) == 2 and not self.hidden and recent[1][0] != recent[0][0]:
             lead = min(1.0, far / (recent[1][0] - recent[0][0]))
             ox, oy = ox + lead * (ox - offs[0][0]), oy + lead * (oy - offs[0][1])
-        self.astray = float(np.hypot(ox, oy))
+        self.astray = hypot(ox, oy)
         return x + ox, y + oy, vx, vy
 
     def _refit(self) -> None:
@@ -387,7 +446,8 @@ class Follower:
         if len(good) < 20:
             return
         t, x, y = np.array([(r.t_s[k], r.place[k].x_px, r.place[k].y_px) for k in good]).T
-        swing = fit_swing(t, x, y, np.full(t.size, 0.1), _restarted(self.swing, t[0]))
+        calm = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}  # little was seen yet: no wild guesses
+        swing = fit_swing(t, x, y, np.full(t.size, 0.5), _restarted(self.swing, t[0]), prior=calm)
         if swing is not None and swing.rms_px < 0.25 * self.look.radius_px + 1:
             self.swing = swing
 

@@ -85,6 +85,31 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 8) -> 
     return _distinct(found, most)
 
 
+def find_round_near(
+    picture: np.ndarray, radius_px: float, sign: int, edge_px: float = 1.0
+) -> tuple[float, float, float] | None:
+    """Where in a piece of a frame (h, w) float32 the outline of a disc of this radius, darker (−1) or brighter (+1) than
+    what is about it, gathers most votes: (x, y, fraction of the circle) in its pixels; None where nothing votes."""
+    import cv2
+
+    if min(picture.shape) < 8:
+        return None
+    smooth = cv2.GaussianBlur(np.ascontiguousarray(picture), (0, 0), max(0.8, 0.7 * edge_px))
+    gx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125)
+    gy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125)
+    size = np.hypot(gx, gy)
+    strong = float(np.percentile(size, 98))
+    rows, columns = np.nonzero(size > max(0.35 * strong, 0.5))
+    if rows.size < 8:
+        return None
+    length = size[rows, columns]
+    weight = np.sqrt(length / strong).clip(0, 1)
+    nx, ny = gx[rows, columns] / length, gy[rows, columns] / length
+    bin_size = max(1.0, radius_px / 7)
+    x, y, votes = _vote(columns, rows, nx, ny, weight, sign * radius_px, bin_size, picture.shape)
+    return x, y, votes / (2 * np.pi * radius_px)
+
+
 def _distinct(found: list[Hypothesis], most: int) -> list[Hypothesis]:
     """The best few that are not the same circle again; at most three of one radius and sign."""
     kept: list[Hypothesis] = []

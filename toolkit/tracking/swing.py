@@ -53,14 +53,7 @@ class Swing:
 
     def angle(self, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """θ (rad, from the fitted vertical) and θ' (rad/s) at times t_s (n,), sorted or not."""
-        t = np.atleast_1d(np.asarray(t_s, float)) - self.t0_s
-        out = np.empty((2, t.size))
-        ahead = np.argsort(t, kind="stable")
-        forward = ahead[t[ahead] >= 0]
-        backward = ahead[t[ahead] < 0][::-1]
-        for order in (forward, backward):
-            if order.size:
-                out[:, order] = solve_swing(self.values, t[order])
+        out = solve_swing(self.values, np.atleast_1d(np.asarray(t_s, float)) - self.t0_s)
         return out[0], out[1]
 
     def position(self, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -115,7 +108,7 @@ def _compiled() -> Any:
 
 
 def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """(2, n): θ and its rate at times t (n,) after that of the state in `values`."""
+    """(2, n): θ and its rate at times t (n,) after that of the state in `values`, integrated from each to the next."""
     out = np.empty((2, t.size))
     _compiled()(values[4], values[5], values[6], values[7], values[8], np.ascontiguousarray(t), out)
     return out
@@ -204,11 +197,10 @@ def start_swing(t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarr
     t = np.asarray(t_s, float) - t_s[0]
     cx, cy, length, _ = fit_circle(x_px, y_px)
     spread = max(float(np.ptp(x_px)), float(np.ptp(y_px)))
-    if not np.isfinite(length) or length > 40 * spread:
+    below = cy > np.mean(y_px)  # bends the wrong way: a hand-held camera and a small swing, or no pendulum
+    if below or not np.isfinite(length) or length > 40 * spread:
         length = 5 * spread  # too flat to tell: any long pendulum will do as a start
         cx, cy = float(np.mean(x_px)), float(np.mean(y_px)) - length
-    if cy > np.mean(y_px):
-        return None
     direction = np.unwrap(np.arctan2(x_px - cx, y_px - cy))
     # θ(t) = θ0 + rate0 t − ω² ∫∫ sin(θ − v): linear in (θ0, rate0, ω² cos v, ω² sin v)
     s2 = _twice_integrated(t, np.sin(direction))
@@ -216,8 +208,12 @@ def start_swing(t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarr
     design = np.column_stack([np.ones(t.size), t, -s2, c2])
     d0, rate0, wc, ws = np.linalg.lstsq(design, direction, rcond=None)[0]
     w2, vertical = float(np.hypot(wc, ws)), float(np.arctan2(ws, wc))
-    if wc <= 0:
-        return None
+    if wc <= 0 or abs(vertical) > 0.5:  # an arc too flat, or a hand too unsteady, to tell: about the middle
+        vertical = float(np.mean(direction))
+        once = _twice_integrated(t, np.sin(direction - vertical))
+        d0, rate0, w2 = np.linalg.lstsq(np.column_stack([np.ones(t.size), t, -once]), direction, rcond=None)[0]
+        if w2 <= 0:
+            return None
     return np.array([cx, cy, length, vertical, w2, 0.0, 0.0, d0 - vertical, rate0])
 
 
