@@ -7,7 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from toolkit import Scene, simulate
+from toolkit.effects.effect import Effect, Parameter, Term
+from toolkit.motion import Equation
 from toolkit.motion.elliptic import solve_pendulum
+from toolkit.motion.flight import free_flight
 from toolkit.motion.slack import solve_with_slack
 
 G, LENGTH = 9.80665, 0.5
@@ -121,3 +125,57 @@ def test_drag_shortens_the_flight():
     first = tau < dragged.events[1].t_s - slack.t_s
     expected = LENGTH * math.sin(slack.theta_rad) + v0 * (1 - np.exp(-2.0 * tau[first])) / 2.0
     assert np.allclose(x[1][first], expected, atol=1e-11)
+
+
+def thrown(m, length, start, drag=0.0):
+    """(t) -> x, y of a body thrown with linear drag, from the state (θ, θ̇) of a taut string."""
+    theta, omega = start
+    x0, y0 = length * math.sin(theta), -length * math.cos(theta)
+    vx, vy = length * omega * math.cos(theta), length * omega * math.sin(theta)
+    rate = drag / m
+
+    def path(t):
+        fade = -np.expm1(-rate * t) / rate
+        return x0 + vx * fade, y0 + (vy + G / rate) * fade - G / rate * t
+
+    return path
+
+
+@pytest.mark.parametrize("k", [0.02, 0.2])
+def test_linear_drag_acts_in_flight_as_on_any_thrown_body(k):
+    m, t = 0.25, np.linspace(0, 2, 2001)
+    table = {
+        "pendulum": {"mass_kg": m, "length_m": LENGTH},
+        "release": {"theta0_rad": 0.0, "omega0_rad_per_s": math.sqrt(3.5 * G / LENGTH)},
+        "environment": {"g_m_per_s2": G},
+        "effects": {"slack_string": {}, "linear_drag": {"k_d_kg_per_s": k}},
+    }
+    motion = simulate(Scene.from_dict(table), t, 1e-10)
+    slack, taut = motion.events[:2]
+    omega = math.sqrt(-G * math.cos(slack.theta_rad) / LENGTH)  # T = 0 there
+    path = thrown(m, LENGTH, (slack.theta_rad, omega), k)
+    aloft = (t > slack.t_s) & (t < taut.t_s)
+    assert aloft.sum() > 100
+    x, y = path(t[aloft] - slack.t_s)
+    r = motion.meta["radius_m"][aloft]
+    np.testing.assert_allclose(r * np.sin(motion.theta_rad[aloft]), x, atol=1e-9)
+    np.testing.assert_allclose(-r * np.cos(motion.theta_rad[aloft]), y, atol=1e-9)
+    assert np.hypot(*path(taut.t_s - slack.t_s)) == pytest.approx(LENGTH, abs=1e-9)  # caught at the string's length
+    assert np.all(np.diff(motion.energy_j) < 1e-9)
+
+
+def test_a_drag_that_nobody_knew_of_acts_in_flight_too():
+    """An effect as docs/add-an-effect.md makes one; its drag, a function of the speed, goes against the velocity."""
+    cubic = Effect(
+        name="cubic_drag", meaning="F = −e |v|² v", term=lambda s: Term(drag=s.e_s_per_m2 * s.speed**2),
+        parameters=(Parameter("e_s_per_m2", "kg·s/m²", "coefficient", symbol="e"),), needs=("mass_kg",),
+        valid="made up", reference="made up", dissipative=True,
+    )  # fmt: skip
+    p = {"mass_kg": 0.2, "length_m": LENGTH, "g_m_per_s2": G, "cubic_drag.e_s_per_m2": 0.03}
+    flight = free_flight(Equation((cubic,)), p)
+    velocity = np.array([1.2, -0.5])
+    expected = np.array([0.0, -G]) - 0.03 * (1.2**2 + 0.5**2) * velocity / 0.2
+    np.testing.assert_allclose(flight.acceleration(0.0, np.array([0.1, 0.2]), velocity), expected, rtol=1e-13)
+    # and on the string the same drag: −e (ℓθ̇)³ ℓ of torque
+    torque = Equation((cubic,)).terms_at(p, 0.0, 0.3, 2.0).torque
+    assert torque == pytest.approx(-0.2 * G * LENGTH * math.sin(0.3) - 0.03 * LENGTH**4 * 8.0, rel=1e-13)

@@ -106,7 +106,7 @@ class _Solver:
         ]
         # a longer step would amplify what decays, however small it has become
         decay = (self.two_alpha + 2 * _product(self.beta, abs(omega[0]))) / _ONE
-        stable = 4.0 / (1e-3 + decay + (abs(self.gravity) / _ONE) ** 0.5)
+        stable = 8.0 / (1e-3 + decay + (abs(self.gravity) / _ONE) ** 0.5)
         self.step = int(min(*sizes, stable) * _ONE)
         self.turned = 0
         if self.beta:
