@@ -6,23 +6,28 @@ import html
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from toolkit.analyse import SERIES_SUFFIXES, VIDEO_SUFFIXES
 from toolkit.errors import JobError, PendulabError, UsageError
 from toolkit.progress import Progress, silent
 from toolkit.scene import Scene
 
+if TYPE_CHECKING:
+    from toolkit.analyse import Analysis
+
 
 @dataclass(frozen=True)
 class BatchRow:
-    """One recording of a class: whether it was done, a sentence, and the numbers for the table."""
+    """One recording of a class: whether it was done, a sentence, the numbers for the table, and for the page the answers
+    (question of `report/words` -> answer, with the marks of `report/numbers`)."""
 
     recording: str
     done: bool
     sentence: str
     numbers: dict[str, Any] = field(default_factory=dict)
     page: str = ""
+    answers: dict[str, str] = field(default_factory=dict)
 
 
 def analyse_folder(
@@ -65,7 +70,7 @@ def analyse_folder(
     for row in results:
         rows.append(row)
         progress(f"{len(rows)} of {len(recordings)} recordings", len(rows) / len(recordings))
-    _write_summary(rows, out)
+    _write_summary(rows, out, lang)
     return rows
 
 
@@ -102,10 +107,23 @@ def _analyse_one(path: Path, out: Path, scene: Scene, lang: str, formats: tuple[
         numbers[f"u({key})"] = parameter.stderr
     sentence = f"{analysis.preferred}; small angle {numbers['small_angle']}, linear drag {numbers['linear_drag']}"
     page = next((f"{out.name}/{p.name}" for p in written if p.suffix == ".html"), "")
-    return BatchRow(path.name, True, sentence, numbers, page)
+    return BatchRow(path.name, True, sentence, numbers, page, _answers(analysis, lang))
 
 
-def _write_summary(rows: list[BatchRow], out: Path) -> None:
+_QUESTIONS = ("drag", "period", "small_angle", "linear_drag")
+
+
+def _answers(analysis: Analysis, lang: str) -> dict[str, str]:
+    from toolkit.report.essentials import facts
+    from toolkit.report.material import Material
+    from toolkit.report.words import load_words
+
+    words = load_words(lang)
+    told = {fact.question: fact.answer for fact in facts(Material(analysis, words))}
+    return {key: told.get(words(f"question.{key}"), "–") for key in _QUESTIONS}
+
+
+def _write_summary(rows: list[BatchRow], out: Path, lang: str) -> None:
     import pandas as pd
 
     from toolkit.output import whole_folder
@@ -113,30 +131,44 @@ def _write_summary(rows: list[BatchRow], out: Path) -> None:
     table = pd.DataFrame([{"recording": r.recording, "done": r.done, "message": r.sentence, **r.numbers} for r in rows])
     with whole_folder(out) as unfinished:
         table.to_csv(unfinished / "summary.csv", index=False)
-        (unfinished / "index.html").write_text(_index_page(rows), encoding="utf-8")
+        (unfinished / "index.html").write_text(_index_page(rows, lang), encoding="utf-8")
 
 
-def _index_page(rows: list[BatchRow]) -> str:
+def _index_page(rows: list[BatchRow], lang: str) -> str:
+    """The class on one page: each recording's answers, or why it has none; `data-name` heads a cell on a phone."""
+    from importlib.resources import files
+
+    from toolkit.report.notebook import marked
+    from toolkit.report.words import load_words
+
+    words = load_words(lang)
+    questions = [words("class.recording"), *(words(f"question.{key}") for key in _QUESTIONS)]
     lines = []
     for row in rows:
         name = html.escape(row.recording)
-        link = f'<a href="{html.escape(row.page, quote=True)}">{name}</a>' if row.page else name
-        state = "done" if row.done else "failed"
-        lines.append(f'<tr class="{state}"><td>{link}</td><td>{state}</td><td>{html.escape(row.sentence)}</td></tr>')
-    done = sum(row.done for row in rows)
+        cells = [f'<a href="{html.escape(row.page, quote=True)}">{name}</a>' if row.page else name]
+        if row.done:
+            cells += [marked(answer) for answer in row.answers.values()]
+            told = zip(questions, cells)
+            lines.append(
+                "<tr>" + "".join(f'<td data-name="{html.escape(q)}"><span>{c}</span></td>' for q, c in told) + "</tr>"
+            )
+        else:
+            failed = f'<td data-name="{html.escape(words("class.failed"))}" colspan="4"><span>{html.escape(row.sentence)}</span></td>'
+            lines.append(f'<tr class="failed"><td data-name="{html.escape(questions[0])}">{cells[0]}</td>{failed}</tr>')
+    title = words("class.title", done=sum(row.done for row in rows), all=len(rows))
+    style = (files("toolkit.report") / "templates" / "report.css").read_text(encoding="utf-8")
+    head = "".join(f"<th scope='col'>{html.escape(question)}</th>" for question in questions)
     return f"""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>pendulab: {done} of {len(rows)} recordings</title>
-<style>
-:root {{ color-scheme: light dark }}
-body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }}
-table {{ border-collapse: collapse; width: 100% }}
-td, th {{ text-align: left; padding: .4rem .8rem; border-bottom: 1px solid #8886 }}
-.failed td {{ color: #b3261e }}
-</style></head><body>
-<h1>{done} of {len(rows)} recordings analysed</h1>
-<p>All numbers are in <a href="summary.csv">summary.csv</a>.</p>
-<table><tr><th>recording</th><th></th><th>result</th></tr>
+<html lang="{words("language.html")}"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1"><title>{html.escape(title)}</title>
+<link rel="icon" href="data:,"><style>
+{style}
+.failed td{{color:var(--bad)}}
+</style></head><body><main>
+<h1>{html.escape(title)}</h1>
+<p>{words("class.numbers", file='<a href="summary.csv">summary.csv</a>')}</p>
+<table><thead><tr>{head}</tr></thead><tbody>
 {chr(10).join(lines)}
-</table></body></html>
+</tbody></table></main></body></html>
 """
