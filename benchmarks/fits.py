@@ -13,6 +13,7 @@ Times are CPU times; compare ratios within one run. Seeds are fixed: a run can b
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import sys
 import tempfile
@@ -318,6 +319,7 @@ def published(folder: Path) -> None:
     if not folder.is_dir():
         sys.exit(f"{folder} is not there; give the folder that holds yyz/ and jlefebvre/")
     _yyz(folder / "yyz")
+    _yyz2(folder / "yyz")
     _jlefebvre(folder / "jlefebvre")
     _jensen(folder / "jensen")
 
@@ -391,6 +393,30 @@ def _yyz(folder: Path) -> None:
     print(
         f"    but the envelope is no exponential: Q at θ₀ is {best.derived['Q'].value:.0f}, to 1/e it takes {_decay(best, series, math.exp(-1)):.0f} s"
     )
+
+
+def _yyz2(folder: Path) -> None:
+    table = np.loadtxt(folder / "lab2_tracker_one_length.txt", skiprows=1, usecols=(0, 1))
+    series = ThetaSeries(table[:, 0], np.radians(table[:, 1]))
+    print(
+        "yyz/lab2_tracker_one_length.txt (nothing published for it alone): the small-angle fit is the better one, and why"
+    )
+    fits = fit_models(series)
+    for name in ("small_angle_linear_drag", "full_linear_drag", "full_linear_quadratic_coulomb"):
+        r = fits[name]
+        print(f"    {name:32s}T0 = {r.derived['T0'].value:.5f} s, residuals {1e3 * r.noise['sigma_rad']:.1f} mrad")
+    quarters = np.linspace(0.0, series.duration_s, 5)
+    print("    the full sine in each quarter alone:")
+    for start, stop in itertools.pairwise(quarters):
+        r = fit(series.between(start, stop), model="full_linear_drag")
+        t0 = r.derived["T0"]
+        print(
+            f"      {start:5.1f} to {stop:5.1f} s, up to {r.parameters['theta0'].value:.2f} rad: T0 = {t0.value:.5f} ± {t0.stderr:.1g} s, "
+            f"residuals {1e3 * r.noise['sigma_rad']:.1f} mrad"
+        )
+    for finding in diagnose(series, fits):
+        if finding.assumption in ("small_angle", "clock", "geometry"):
+            print(f"    {finding.assumption}, {finding.verdict}: {finding.sentence}")
 
 
 def _jlefebvre(folder: Path) -> None:

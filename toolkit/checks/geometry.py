@@ -77,15 +77,29 @@ def check(evidence: Evidence) -> Finding | None:
             words_key="geometry.scale",
             words_values=values,
         )
-    if not np.isfinite(u) or u > _USEFUL_U:
+    if rival and held is None and gain > _CLEAR and abs(scale) > _SMALLEST_SCALE:
         return Finding(
             "geometry",
             NOT_DISTINGUISHABLE,
             evidence=numbers,
-            sentence=f"This record fixes the scale of the angles only to {100 * min(u, 9.99):.2g} %: a tilted camera would not show.",
+            sentence=(
+                f"The period does not change with amplitude as it should; angles out of scale by {100 * abs(scale):.2g} % would explain "
+                "it, but a change of the clock explains it better: see there."
+            ),
+            remedy="film with a fixed frame rate, square to the swing",
+            words_key="geometry.or_clock",
+            words_values=values,
+        )
+    loose = min(max(u, abs(scale)), 9.99) if np.isfinite(u) else 9.99
+    if loose > _USEFUL_U:
+        return Finding(
+            "geometry",
+            NOT_DISTINGUISHABLE,
+            evidence=numbers,
+            sentence=f"This record fixes the scale of the angles only to {100 * loose:.2g} %: a tilted camera would not show.",
             remedy="start from a larger angle, or film square to the swing",
             words_key="geometry.not_distinguishable",
-            words_values=values,
+            words_values={**values, "scale_u": loose},
         )
     return Finding(
         "geometry",
