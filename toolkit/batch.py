@@ -136,8 +136,7 @@ def _write_summary(rows: list[BatchRow], out: Path, lang: str) -> None:
 
 def _index_page(rows: list[BatchRow], lang: str) -> str:
     """The class on one page: each recording's answers, or why it has none; `data-name` heads a cell on a phone."""
-    from importlib.resources import files
-
+    from toolkit.report.html import page_style
     from toolkit.report.notebook import marked
     from toolkit.report.words import load_words
 
@@ -157,7 +156,7 @@ def _index_page(rows: list[BatchRow], lang: str) -> str:
             failed = f'<td data-name="{html.escape(words("class.failed"))}" colspan="4"><span>{html.escape(row.sentence)}</span></td>'
             lines.append(f'<tr class="failed"><td data-name="{html.escape(questions[0])}">{cells[0]}</td>{failed}</tr>')
     title = words("class.title", done=sum(row.done for row in rows), all=len(rows))
-    style = (files("toolkit.report") / "templates" / "report.css").read_text(encoding="utf-8")
+    style = page_style(lang)
     head = "".join(f"<th scope='col'>{html.escape(question)}</th>" for question in questions)
     return f"""<!doctype html>
 <html lang="{words("language.html")}"><head><meta charset="utf-8">

@@ -27,9 +27,6 @@ def render(report: Report) -> str:
     folder = files("toolkit.report") / "templates"
     environment = Environment(autoescape=True, trim_blocks=False)
     template = environment.from_string((folder / "report.html").read_text(encoding="utf-8"))
-    style = (folder / "report.css").read_text(encoding="utf-8")
-    if report.words.lang == "th":
-        style = _font_face() + style.replace("font:16px/1.55 ", 'font:16px/1.7 "Noto Sans Thai",')
 
     def inline(item: Any) -> Any:
         label = bare(getattr(item, "caption", "") or getattr(item, "latex", ""))
@@ -38,7 +35,7 @@ def render(report: Report) -> str:
 
     return template.render(
         report=report,
-        style=Markup(style),
+        style=Markup(page_style(report.words.lang)),
         word=report.words,
         marks=rich,
         plain=bare,
@@ -55,8 +52,14 @@ def numbering(report: Report) -> dict[str, int]:
     return numbers | {table.key: n for n, table in enumerate(tables, 1)}
 
 
-def _font_face() -> str:
-    """The Thai font inside the page."""
+def page_style(lang: str) -> str:
+    """The style sheet of our pages, with the Thai font inside where the language needs it."""
+    style = (files("toolkit.report") / "templates" / "report.css").read_text(encoding="utf-8")
+    return font_face() + style.replace("font:16px/1.55 ", 'font:16px/1.7 "Noto Sans Thai",') if lang == "th" else style
+
+
+def font_face() -> str:
+    """The Thai font as CSS."""
     faces = []
     for name, weight in (("Regular", 400), ("Bold", 700)):
         data = (files("toolkit.report") / "fonts" / f"NotoSansThai-{name}.ttf").read_bytes()

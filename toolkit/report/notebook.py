@@ -87,5 +87,5 @@ def analysis_html(analysis: Analysis, lang: str = "en") -> str:
         f"<tr><td>{marked(f.question)}</td><td><b>{marked(f.answer)}</b><br><small>{marked(f.remark)}</small></td></tr>"
         for f in facts(material)
     )
-    said = "".join(finding_html(f, lang) for f in analysis.findings)
-    return f"<div><b>{escape(analysis.source.name)}</b><br>{marked(lead(material))}<table>{rows}</table>{said}</div>"
+    told = "".join(finding_html(f, lang) for f in analysis.findings)
+    return f"<div><b>{escape(analysis.source.name)}</b><br>{marked(lead(material))}<table>{rows}</table>{told}</div>"

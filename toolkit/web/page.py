@@ -16,6 +16,7 @@ from nicegui import app, events, ui
 from toolkit.analyse import SERIES_SUFFIXES, VIDEO_SUFFIXES, is_video
 from toolkit.errors import PendulabError
 from toolkit.make_report import make_report
+from toolkit.report.html import font_face
 from toolkit.scene import Environment, Pendulum, Scene
 
 _WORDS = {
@@ -75,6 +76,7 @@ def build_page() -> None:
     def content(lang: str) -> None:
         _content(visit, lang)
 
+    ui.add_css(font_face() + 'body{font-family:Roboto,"Noto Sans Thai",sans-serif}')
     with ui.column().classes("w-full max-w-3xl mx-auto p-4 gap-4"):
         choice = ui.toggle({"en": "English", "th": "ไทย"}, value="en").classes("self-end").mark("lang")
         content("en")
@@ -108,6 +110,8 @@ def _content(visit: _Visit, lang: str) -> None:
         radius = ui.number(words["radius"], min=0, format="%.6g")
         gravity = ui.number(words["gravity"], value=9.80665, min=0, format="%.6g")
         slow = ui.number(words["slow"], value=1, min=0, format="%.6g")
+        for field_ in (mass, length, radius, gravity, slow):
+            field_.classes("w-full sm:w-72")
     result = ui.column().classes("w-full")
 
     async def go() -> None:
@@ -187,13 +191,13 @@ async def _analyse(
     address = f"/results/{out.name}"
     app.add_static_files(address, out)
     zip_address = app.add_static_file(local_file=archive, url_path=f"{address}.zip")
-    from toolkit.report.terminal import summary_lines
+    from toolkit.report.notebook import analysis_html
 
     result.clear()
     with result:
-        ui.label("\n".join(summary_lines(analysis, lang))).classes("whitespace-pre-line")
         ui.link(words["open"], f"{address}/report.html", new_tab=True).mark("report")
         ui.link(words["all"], zip_address).mark("zip")
+        ui.html(analysis_html(analysis, lang), sanitize=False)  # every text in it is escaped
 
 
 def _first_frame(path: Path) -> tuple[str, tuple[int, int]]:
