@@ -155,13 +155,12 @@ class Jet:
         if a == b:
             self.each += [
                 "v = 0.0",
-                "j = (k + 1) // 2 - 1",
-                "while j >= 0:",  # the newest coefficient last
+                "for j in range(1, (k + 1) // 2):",
                 f"    v += W[{a * ROW} + j] * W[{a * ROW} + k - j]",
-                "    j -= 1",
                 "v *= 2.0",
                 "if k % 2 == 0:",
                 f"    v += W[{a * ROW} + k // 2] * W[{a * ROW} + k // 2]",
+                f"v += 2.0 * W[{a * ROW}] * W[{a * ROW} + k]",  # the newest last: nothing waits for it
             ]
         else:
             self.each += [
