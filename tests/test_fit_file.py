@@ -26,6 +26,9 @@ def test_fit_json_has_the_layout_others_rely_on(tmp_path):
     model = table["models"]["small_angle_linear_drag"]
     assert {"parameters", "chi2", "dof", "reduced_chi2", "aic", "bic", "success", "message", "noise"} <= set(model)
     assert {"k_d", "theta0", "phi"} <= set(model["parameters"])
+    beside = model["beside_preferred"]
+    u = math.hypot(beside["paper_u"], beside["preferred_u"])
+    assert beside["difference_sigma"] == (beside["paper"] - beside["preferred"]) / u
     assert model["parameters"]["k_d"].keys() == {"value", "stderr", "unit", "fixed"}
     assert [f["assumption"] for f in table["findings"]][:2] == ["small_angle", "linear_drag"]
     for finding in table["findings"]:

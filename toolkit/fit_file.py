@@ -12,6 +12,7 @@ import numpy as np
 
 from toolkit.checks.finding import Finding
 from toolkit.fit import FitResult, FittedParameter
+from toolkit.fitting.uncertainty import small_angle_bias
 from toolkit.output import whole_file
 from toolkit.series import ThetaSeries
 
@@ -23,13 +24,20 @@ def write_fit_json(
     findings: Sequence[Finding],
     preferred: str,
 ) -> None:
-    """Write fit.json as the design's section 5 lays it out. Numbers that do not exist are null."""
-    table = {
+    """Write fit.json as the design's section 5 lays it out. Numbers that do not exist are null.
+
+    The paper's model has `beside_preferred` too: its k_d (or alpha_d), the preferred model's equivalent linear value at θ₀, u of
+    both and their difference in σ.
+    """
+    table: dict[str, Any] = {
         "series": _series_entry(series),
         "preferred": preferred,
         "models": {name: _model_entry(result) for name, result in fits.items()},
         "findings": [_finding_entry(finding) for finding in findings],
     }
+    beside = small_angle_bias(fits, preferred)
+    if beside:
+        table["models"]["small_angle_linear_drag"]["beside_preferred"] = beside
     with whole_file(path) as scratch:
         scratch.write_text(json.dumps(_plain(table), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 

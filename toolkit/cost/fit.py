@@ -187,9 +187,11 @@ def describe(results: list[Result], quick: bool = False) -> str:
     lines += [
         "",
         "From the data alone, first guess included:",
-        f"  {'model':36s}{'points':>8s}{'ms':>9s}{'solves':>8s}",
+        f"  {'model':36s}{'points':>8s}{'ms':>9s}{'lmfit calls':>13s}",
     ]
-    lines += [f"  {r.method:36s}{r.points:8d}{r.cpu_ms:9.1f}{r.evaluations:8d}" for r in results if r.group == "points"]
+    lines += [
+        f"  {r.method:36s}{r.points:8d}{r.cpu_ms:9.1f}{r.evaluations:13d}" for r in results if r.group == "points"
+    ]
     lines += ["", "Roads to an error bar (u of β beside the covariance's):"]
     lines += [
         f"  {r.method:36s}{r.cpu_ms:9.1f} ms   u ratio {r.excess_chi2:.2f}" for r in results if r.group == "errors"
