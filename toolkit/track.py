@@ -29,7 +29,7 @@ OK, PREDICTED, LOST = "ok", "predicted", "lost"
 
 
 _CALM = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}  # damping of a pendulum of which little is known yet
-_POOR_PICTURE = 0.2  # of the contrast
+_POOR_PICTURE = 0.12  # of the contrast
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
 
 
@@ -232,12 +232,10 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         known = shift.sigma[good], time_sigma, follower.shaking
         return true_sigma((rx[good], ry[good]), (sx[good], sy[good]), v, *known)
 
+    vx, vy = (np.hypot(v * time_sigma, shift.sigma) for v in swing.velocity(t))
+    scale = _scatter(x - mx, y - my)
     for _ in range(2):  # error bars and the view of the camera each need the other
-        vx, vy = (np.hypot(v * time_sigma, shift.sigma) for v in swing.velocity(t))
-        scale = _scatter(x - mx, y - my)
-        sigma = np.hypot(shift.sigma, scale.shake_px)
-        before = view
-        view = fit_view(
+        found = fit_view(
             t[good] / fps_factor,
             x[good],
             y[good],
@@ -249,13 +247,13 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             None if pivot is None else (*pivot, 1.0),
             rows_along_x=video.rotation_deg % 180 != 0,
         )
-        if view is None:
-            view = before
+        if found is None:
             break
+        view = found
         mx, my = view.position(t / fps_factor, mx, my)
-        if not view.shown:
+        before, scale = scale, _scatter(x - mx, y - my)
+        if not view.shown or min(scale.x / before.x, scale.y / before.y) > 0.6:
             break
-    scale = _scatter(x - mx, y - my)
     sigma = np.hypot(shift.sigma, scale.shake_px)
     sx, sy = sx * scale.x, sy * scale.y
     rms_px = float(np.sqrt(0.5 * np.mean((x - mx)[good] ** 2 + (y - my)[good] ** 2)))
@@ -264,7 +262,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     motion = swing if view is None else view.swing(fps_factor)
     warnings += poor_motion(motion, t, good, rms_px, typical)
     misfit = float(np.median([p.misfit for p, g in zip(r.place, good) if g])) / max(abs(follower.look.contrast), 1.0)
-    if misfit > _POOR_PICTURE:
+    if misfit > _POOR_PICTURE or not follower.look.even:
         warnings.append(
             said(
                 "track.poor_picture",

@@ -21,6 +21,7 @@ from toolkit.video import Frame
 
 _STRING_EVERY = 3
 _CHECK_EVERY = 12
+_AROUND = np.stack([f(np.arange(24) * np.pi / 12) for f in (np.cos, np.sin)])
 
 
 @dataclass
@@ -69,6 +70,12 @@ class Follower:
         self._found = {batch[i].index: p for i, p in points.items()}
         self._learn_background(batch, rough.look, points)
         self.look, self.exposure_s = self._learn_looks(batch, rough.look, points, radius)
+        if self.look.noise > 0.2 * abs(self.look.contrast):
+            # what else there is beside the bob (a shadow) was fitted too, unless it must stand out as none of it
+            strict = rough.look._replace(noise=0.05 * abs(rough.look.contrast) + 1.0)
+            look, exposure_s = self._learn_looks(batch, strict, points, radius)
+            if look.noise < 0.6 * self.look.noise:
+                self.look, self.exposure_s = look, exposure_s
         self.ordinary_misfit = self.look.noise
         self.ordinary_visible = 0.85
         self.localiser: Localiser = self._choose(batch, points, wanted)
@@ -143,8 +150,6 @@ class Follower:
         vx, vy = self.swing.velocity(np.array([batch[i].t_s for i in numbers]))
         speed = np.hypot(vx, vy)
         found_px = look.radius_px
-        # what else there is beside the bob (a shadow) must stand out as none of it, or it is fitted too
-        look = look._replace(noise=min(look.noise, 0.05 * abs(look.contrast) + 1.0))
 
         def fit(k: int, look: Look, part: float, **how: bool | int) -> np.ndarray | None:
             i = numbers[k]
@@ -236,7 +241,7 @@ class Follower:
                 best, least = candidate, swing.rms_px * (0.9 if name == "disc" else 1.0)
                 self.ordinary_misfit = float(np.percentile(misfit, 90))
                 # a rolling shutter shears the outline where the bob is fast: what is ordinary is not hidden
-                self.ordinary_visible = float(np.clip(np.percentile(visible, 25) - 0.05, 0.65, 0.85))
+                self.ordinary_visible = float(np.clip(np.median(visible) - 0.1, 0.65, 0.85))
                 self.swing = swing
         return best
 
@@ -299,6 +304,7 @@ class Follower:
         ok = self._believe(place, x, y)
         if not ok and not repeated:
             place, patch, ok = self._look_around(frame, guess, place, patch)
+        ok = ok and patch is not None and self._stands_out(patch, place)
         r = self.record
         r.index.append(frame.index)
         r.t_s.append(frame.t_s)
@@ -352,7 +358,8 @@ class Follower:
         other = self._locate(close, near)
         px, py = self.pivot or self.swing.pivot_px
         off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - np.hypot(guess.x_px - px, guess.y_px - py))
-        if self._believe(other, near.x_px, near.y_px) and off_arc < 0.5 * look.radius_px + 2:
+        alike = other.visible >= 0.9 and 0.6 < other.contrast / look.contrast < 1.6
+        if alike and self._believe(other, near.x_px, near.y_px) and off_arc < 0.5 * look.radius_px + 2:
             return other, close, True
         return place, patch, False
 
@@ -374,6 +381,22 @@ class Follower:
             and place.misfit < 2 * self.ordinary_misfit + 0.03 * abs(look.contrast)
             and np.hypot(place.x_px - x, place.y_px - y) < 0.6 * look.radius_px + 2
         )
+
+    def _stands_out(self, patch: Patch, place: Place) -> bool:
+        """Does the bob differ from what is known to stand still around it? Half behind a post of its own brightness it
+        seems whole: where most of its outline could not be seen, it is not believed."""
+        shade = self._shade
+        if np.isnan(shade) or not np.isfinite(place.wall):
+            return True
+        reach = self.look.radius_px + 2
+        columns = np.round(place.x_px - patch.x_px + reach * _AROUND[0]).astype(int)
+        rows = np.round(place.y_px - patch.y_px + reach * _AROUND[1]).astype(int)
+        height, width = patch.back.shape
+        inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
+        if inside.sum() < 8:
+            return True
+        level = patch.back[rows[inside], columns[inside]]
+        return bool(np.mean(np.abs(level - shade) > 0.3 * abs(self.look.contrast)) > 0.65)
 
     def _remember(self, frame: Frame, place: Place) -> None:
         """What the next frames are judged by."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +48,7 @@ def true_sigma(
         if factors[i] > _MOST and (shaking or factors[i] > _WORST):
             left[i] = float(np.sqrt(factors[i] ** 2 - _MOST**2) * np.median(s))
             factors[i] = _MOST
-    return Factors(max(float(factors[0]), 0.5), max(float(factors[1]), 0.5), float(np.hypot(*left)) * 0.7071)
+    return Factors(max(float(factors[0]), 0.5), max(float(factors[1]), 0.5), math.hypot(*left) / math.sqrt(2))
 
 
 def scatter(r: np.ndarray, width: int = 15) -> float:

@@ -37,7 +37,7 @@ _UNITS = {"k1": "", "readout": "_s"}
 _TILTS = ((0.1, 0.05), (-0.1, 0.05), (0.1, -0.05), (-0.1, -0.05))  # mirrored views are minima of their own
 _SQUARE = (*SWING_NAMES, "factor")
 _GEOMETRY = tuple(_AT[n] for n in NAMES if n not in SWING_NAMES[4:] and n != "factor")
-_MOST = 400  # positions that are enough to see what the camera did
+_MOST = 300  # positions, and a third as many lines, are enough to see what the camera did
 _CLEAR = 25.0  # by how much χ² must fall before a camera effect is believed
 
 
@@ -332,6 +332,9 @@ class _Problem:
         self.view, self.t, self.x, self.y = view, t_s - view.t0_s, x, y
         self.wx, self.wy = 1 / sx, 1 / sy
         self.rows = view._rows(x, y)
+        if lines is not None and lines.x_px.size > _MOST // 3:
+            every = np.unique(np.linspace(0, lines.x_px.size - 1, _MOST // 3).astype(int))
+            lines = Lines(*(column[every] for column in lines))
         self.lines, self.pivot = lines, pivot
         self.line_weight = np.zeros(0) if lines is None else np.ones(lines.x_px.size)
         self.steps = _STEPS.copy()
