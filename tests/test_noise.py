@@ -78,3 +78,28 @@ def test_spread_is_the_covariance_of_projections():
     measured = noise.Noise(1.0, "series", 1, 1, rho, 0, 0, 0, False, (rho,), 1, n)
     expected = noise.spread(columns, measured)
     assert np.allclose(np.cov(drawn.T), expected, rtol=0.15, atol=0.05 * expected.max())
+
+
+def test_what_a_fit_takes_out_of_slow_noise_is_put_back():
+    """Short records of AR(1) noise of unknown strength from which a swing was fitted: pulls of its coefficients."""
+    n, phase = 240, 3.2 / 30
+    t = np.arange(n)
+    wave = np.stack([np.sin(phase * t), np.cos(phase * t)], axis=1)
+    columns = np.hstack([wave, wave * (t / n)[:, None], np.ones((n, 1))])
+    inverse, project = np.linalg.inv(columns.T @ columns), np.linalg.pinv(columns)
+
+    def spread_of_pulls(jacobian):
+        pulls = []
+        for seed in range(100):
+            x = ar1(n, 0.95, seed)
+            fitted = project @ x
+            left = x - columns @ fitted
+            scatter = math.sqrt(left @ left / (n - 5))
+            measured = noise.measure_noise(left / scatter, scatter, False, 3.2, 1 / 30, 5, jacobian)
+            covariance = inverse @ noise.spread(columns, measured) @ inverse * scatter**2
+            pulls.append(fitted / np.sqrt(np.diag(covariance)))
+        return np.std(pulls, axis=0)
+
+    put_back, plain = spread_of_pulls(columns), spread_of_pulls(None)
+    assert np.all(put_back < 0.95 * plain)
+    assert np.all((put_back[:4] > 0.8) & (put_back[:4] < 1.3))
