@@ -95,10 +95,10 @@ def cover_still(depth, soft, share, rise, widen):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS_IN_ANY_ORDER)
-def cover_piece(before, after, part, soft, share, rise, widen):
+def cover_piece(before, after, lift, part, soft, share, rise, widen):
     """Add what it covers while the depth goes evenly from `before` to `after`, in `part` of the exposure."""
     for i in range(before.size):
-        a, b = before[i], after[i]
+        a, b = before[i] + lift[i], after[i] + lift[i]
         pa, pb = min(1.0, max(-1.0, a)), min(1.0, max(-1.0, b))
         qa, qb = pa * pa, pb * pb
         # the edge function's integral at both ends, which goes on straight beyond ±1
@@ -110,7 +110,7 @@ def cover_piece(before, after, part, soft, share, rise, widen):
         share[i] += part * (middle if abs(b - a) < 1e-3 else (ib - ia) / (b - a))
     narrow = part / soft
     for i in range(before.size):
-        a, b = before[i], after[i]
+        a, b = before[i] + lift[i], after[i] + lift[i]
         pa, pb = min(1.0, max(-1.0, a)), min(1.0, max(-1.0, b))
         qa, qb = pa * pa, pb * pb
         ea = pa * (E0 + qa * (E1 + qa * (E2 + qa * (E3 + qa * E4))))
@@ -124,20 +124,24 @@ def cover_piece(before, after, part, soft, share, rise, widen):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def cover(x, y, disc, streak, share, rise, widen, nearness, before, after):
+def cover(x, y, disc, streak, share, rise, widen, nearness, before, after, lift):
     """What the disc covers of each pixel in the mean over the exposure, and its slopes; along the streak the depth is
-    taken as linear in each of a few pieces."""
+    taken as linear in each of a few pieces, lifted by the mean of how far its curve is above them."""
     cx, cy, radius, soft = disc[0], disc[1], disc[2], disc[3]
     for i in range(x.size):
         share[i] = rise[i] = widen[i] = 0.0
     length = np.sqrt(streak[0] * streak[0] + streak[1] * streak[1])
     if length >= 0.05:
         pieces = 1 + int(min(15.0, length / np.sqrt(radius + 1.0)))
+        measure_depth(x, y, cx, cy, radius, soft, after, nearness)
+        for i in range(x.size):
+            across = (streak[0] * (y[i] - cy) - streak[1] * (x[i] - cx)) * nearness[i] / pieces
+            lift[i] = across * across * nearness[i] / (12.0 * soft)
         for k in range(pieces + 1):
             u = k / pieces - 0.5
             measure_depth(x, y, cx + u * streak[0], cy + u * streak[1], radius, soft, after, nearness)
             if k:
-                cover_piece(before, after, 1.0 / pieces, soft, share, rise, widen)
+                cover_piece(before, after, lift, 1.0 / pieces, soft, share, rise, widen)
             before, after = after, before
     measure_depth(x, y, cx, cy, radius, soft, after, nearness)
     if length < 0.05:
@@ -321,7 +325,7 @@ def fit(image, back, seen, start, streak, string, noise, contrast, free, inside,
                 level += wall[i] / count
             if first == 0:
                 shade[0], shade[3] = level + contrast, 1.0
-        cover(x, y, disc, streak, share, rise, widen, nearness, spare, lists[12, :count])
+        cover(x, y, disc, streak, share, rise, widen, nearness, spare, lists[12, :count], rest)
         compare(x, y, bright, wall, doubt, disc, shade, cut, share, rise, widen, nearness, slope, rest, weight)
         squares = normal_equations(slope, weight, rest, free, normal, right, spare)
         if not decompose(normal, lower, free):
