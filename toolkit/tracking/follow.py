@@ -21,7 +21,8 @@ from toolkit.video import Frame
 
 _STRING_EVERY = 3
 _CHECK_EVERY = 12
-_AROUND = np.stack([f(np.arange(24) * np.pi / 12) for f in (np.cos, np.sin)])
+_TURN = np.arange(100) * np.pi * (3 - np.sqrt(5))  # a sunflower's places: even over the unit disc
+_WITHIN = np.sqrt((np.arange(100) + 0.5) / 100) * np.stack([np.cos(_TURN), np.sin(_TURN)])
 
 
 @dataclass
@@ -383,20 +384,19 @@ class Follower:
         )
 
     def _stands_out(self, patch: Patch, place: Place) -> bool:
-        """Does the bob differ from what is known to stand still around it? Half behind a post of its own brightness it
-        seems whole: where most of its outline could not be seen, it is not believed."""
+        """Does the bob differ from what is known to stand still where it is? Half behind a post of about its own brightness it
+        seems whole: where nearly half of it could not be told from what is there without it, it is not believed."""
         shade = self._shade
         if np.isnan(shade) or not np.isfinite(place.wall):
             return True
-        reach = self.look.radius_px + 2
-        columns = np.round(place.x_px - patch.x_px + reach * _AROUND[0]).astype(int)
-        rows = np.round(place.y_px - patch.y_px + reach * _AROUND[1]).astype(int)
+        columns = np.round(place.x_px - patch.x_px + self.look.radius_px * _WITHIN[0]).astype(int)
+        rows = np.round(place.y_px - patch.y_px + self.look.radius_px * _WITHIN[1]).astype(int)
         height, width = patch.back.shape
         inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
         if inside.sum() < 8:
             return True
         level = patch.back[rows[inside], columns[inside]]
-        return bool(np.mean(np.abs(level - shade) > 0.3 * abs(self.look.contrast)) > 0.65)
+        return bool(np.mean(np.abs(level - shade) > 0.45 * abs(self.look.contrast)) > 0.6)
 
     def _remember(self, frame: Frame, place: Place) -> None:
         """What the next frames are judged by."""
@@ -430,7 +430,7 @@ class Follower:
                 ok = self._believe(place, x, y)
                 if not ok:
                     place, patch, ok = self._look_around(frame, guess, place, patch)
-                if ok:
+                if ok and patch is not None and self._stands_out(patch, place):
                     r.place[k], r.ok[k] = place, True
                     self._remember(frame, place)
                 else:

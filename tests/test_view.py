@@ -1,0 +1,102 @@
+"""What the camera did is found from the renderer's own geometry, which shares no code with the fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from toolkit.render import stage
+from toolkit.scene import Scene
+from toolkit.tracking.clock import place_lost_frames
+from toolkit.tracking.swing import Swing, fit_swing, start_swing
+from toolkit.tracking.view import Lines, fit_view
+
+SIGMA = 0.03
+
+
+def seen(**effects):
+    """View of a filmed swing of 25°, and its truth: noisy places, the string's line on every third frame."""
+    camera = {
+        "width_px": 640,
+        "height_px": 480,
+        "fps": 60,
+        "duration_s": 4.0,
+        "px_per_m": 620,
+        "pivot_px": [318.0, 30.5],
+    }
+    table = {
+        "pendulum": {"mass_kg": 0.1, "length_m": 0.6, "bob_radius_m": 0.02},
+        "release": {"theta0_rad": 0.44},
+        "effects": {"linear_drag": {"k_d_kg_per_s": 2e-3}},
+        "camera": {**camera, **effects},
+    }
+    truth = stage(Scene.from_dict(table)).truth
+    rng = np.random.default_rng(5)
+    t, n = truth.stamp_s, truth.t_s.size
+    x, y = truth.x_px + rng.normal(0, SIGMA, n), truth.y_px + rng.normal(0, SIGMA, n)
+    some = np.arange(0, n, 3)
+    dx, dy = (truth.x_px - truth.pivot_px[:, 0])[some], (truth.y_px - truth.pivot_px[:, 1])[some]
+    middle = 0.5 * (truth.pivot_px[some] + np.stack([truth.x_px, truth.y_px], axis=1)[some])
+    turn, place = np.full(some.size, 2e-4), np.full(some.size, 0.02)
+    lines = Lines(*middle.T, np.arctan2(dx, dy) + rng.normal(0, 2e-4, some.size), turn, place)
+    sigma = np.full(n, SIGMA)
+    view = fit_view(t, x, y, sigma, sigma, start_swing(t, x, y), (640, 480), lines)
+    return view, truth, (t, x, y)
+
+
+def errors(view, truth, places):
+    """Relative error of all angles, its stated σ, and what else is wrong (rad, rms)."""
+    theta, _ = view.angles(*places)
+    design = np.column_stack([np.ones_like(theta), truth.theta_rad])
+    zero, factor = np.linalg.lstsq(design, theta, rcond=None)[0]
+    _, scale_u, _, _ = view.uncertainty(*places)
+    return factor - 1, scale_u, float(np.std(theta - zero - factor * truth.theta_rad))
+
+
+def test_a_square_view_is_left_alone():
+    view, truth, places = seen()
+    assert view.shown == ()
+    off, u, rest = errors(view, truth, places)
+    assert abs(off) < 5e-4
+    assert off**2 < (4 * u) ** 2
+    assert rest < 1.3 * SIGMA / 372
+    assert np.hypot(*(np.array(view.pivot_px) - (318.0, 30.5))) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("effects", "group"),
+    [
+        ({"perspective": {"yaw_rad": 0.25, "pitch_rad": 0.08, "distance_m": 1.5}}, "tilt"),
+        ({"out_of_plane": {"amplitude_rad": 0.1, "phase_rad": 1.5708 + 1.5708, "distance_m": 2.0}}, "sway"),
+        ({"rolling_shutter": {"readout_s": 0.012}}, "readout"),
+    ],
+)
+def test_what_the_camera_did_is_found_and_taken_out(effects, group):
+    view, truth, places = seen(**effects)
+    assert group in view.shown
+    off, u, rest = errors(view, truth, places)
+    assert abs(off) < 4 * u + 1e-3
+    assert abs(off) < 0.01
+    if group == "readout":
+        assert view["readout"] == pytest.approx(0.012, abs=0.002)
+    else:
+        assert rest < 2e-3 * 0.44
+
+
+def test_a_lost_frame_is_placed_where_the_motion_leaps():
+    motion = Swing(np.array([320, -60, 400, 0.0, 12.0, 0.02, 0.0, 0.4, 0.0]), np.zeros((9, 9)), 0.0, 0.0)
+    true = np.arange(301) / 60
+    true = np.delete(true, 130)  # the camera lost this one and counted on
+    x, y = motion.position(true)
+    rng = np.random.default_rng(1)
+    x, y = x + rng.normal(0, 0.05, x.size), y + rng.normal(0, 0.05, y.size)
+    stamps = np.arange(300) / 60
+    good = np.ones(300, bool)
+    swing = fit_swing(stamps, x, y, np.full(300, 0.1), motion.values)
+    warned: list[str] = []
+    t, better = place_lost_frames(stamps, x, y, swing, good, np.zeros(300, bool), warned)
+    assert len(warned) == 1
+    np.testing.assert_allclose(t, true, atol=2e-3)
+    assert better.rms_px < 0.06
+    same, _ = place_lost_frames(true, x, y, better, good, np.zeros(300, bool), [])
+    np.testing.assert_array_equal(same, true)
