@@ -84,6 +84,8 @@ def _without_mass(words: Words, result: FitResult) -> str:
     """How k_d follows from α_d once the bob is weighed."""
     found = result.parameters["alpha_d"]
     per_gram = with_uncertainty(2e-3 * found.value, 2e-3 * found.stderr if found.stderr else None, "kg/s")
+    if found.stderr and found.value < found.stderr:  # the bound at 95 %, as the answer gives it
+        per_gram = f"< {number(2e-3 * (max(found.value, 0) + 1.645 * found.stderr), 2)} kg/s"
     return words("answer.no_mass", per_gram=per_gram)
 
 
@@ -137,12 +139,14 @@ def _short_answer(material: Material, finding: Finding) -> str:
         widest = evidence.get("amplitude_max_rad")
         if finding.verdict == "fails" and "amplitude_above_rad" in where:
             angle = number(math.degrees(where["amplitude_above_rad"]), 2)
+            if widest and where["amplitude_above_rad"] > 0.97 * widest:
+                return words("answer.no_at_widest", widest=number(math.degrees(widest), 3))
             return words("answer.no_to", angle=angle, widest=number(math.degrees(widest), 3) if widest else "–")
         if finding.verdict == "holds" and widest:
             return words("answer.yes_to", angle=number(math.degrees(widest), 2))
     widest = float(np.max(np.abs(material.theta - material.offset)))
-    if finding.verdict == "fails" and where.get("amplitude_below_rad", 0.0) >= 0.9 * widest:
-        return words("answer.throughout")
+    if finding.words_key.endswith(".throughout"):
+        return words("answer.throughout" if "amplitude_below_rad" in where else "answer.throughout_v2")
     if finding.verdict == "fails" and "amplitude_above_rad" in where:
         return words("answer.above", angle=number(math.degrees(where["amplitude_above_rad"]), 2))
     if finding.verdict == "fails" and "amplitude_below_rad" in where:

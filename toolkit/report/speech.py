@@ -76,8 +76,8 @@ def remedy(words: Words, finding: Finding) -> str:
 
 def _said(words: Words, kind: str, finding: Finding, otherwise: str) -> str:
     key = f"{kind}.{finding.words_key}"
-    if finding.where.get("amplitude_below_rad", 0.0) > 3 and f"{key}.throughout" in words:
-        key = f"{key}.throughout"
+    if key not in words:
+        key = key.removesuffix(".throughout")  # one remedy for both
     if key not in words:
         return say(words, otherwise)
     try:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from toolkit.report.document import Figure
 from toolkit.report.material import DRAGS, Material
-from toolkit.report.style import BEST_MODEL, INK, draw, panels
+from toolkit.report.style import BEST_MODEL, INK, PAPER_MODEL, draw, panels
+
+if TYPE_CHECKING:
+    from toolkit.fitting.contour import Contour
+
+_LEVELS = (2.296, 6.180)  # Δχ² of two parameters at 68.3 and 95.4 %
+_MOST_POINTS = 1500
 
 
 def contours(material: Material) -> Figure | None:
@@ -37,11 +43,16 @@ def contours(material: Material) -> Figure | None:
     units = [_unit(p.unit, power) for p, power in zip(parameters, powers)]
     scaled = covariance / np.outer(10.0 ** np.array(powers), 10.0 ** np.array(powers))
 
+    profiled = _profile(material, result, result.free[first], result.free[second])
+
     def paint(figure: Any) -> None:
         left, right = panels(figure, 1, 2, left=0.85, gap=0.8, bottom=0.62, width_ratios=(1.15, 1))
+        if profiled is not None:
+            x, y = profiled.first / 10.0 ** powers[first], profiled.second / 10.0 ** powers[second]
+            left.contour(x, y, profiled.delta_chi2, levels=_LEVELS, colors=[PAPER_MODEL], linewidths=[1.1, 0.8])
         turn = np.linspace(0, 2 * np.pi, 181)
         root = np.linalg.cholesky(scaled[np.ix_([first, second], [first, second])])
-        for k, alpha in ((2, 0.18), (1, 0.35)):
+        for k, alpha in ((math.sqrt(_LEVELS[1]), 0.18), (math.sqrt(_LEVELS[0]), 0.35)):
             x, y = k * root @ np.vstack([np.cos(turn), np.sin(turn)])
             left.fill(values[first] + x, values[second] + y, color=BEST_MODEL, alpha=alpha, linewidth=0)
         left.plot(values[first], values[second], "+", color=INK, markersize=6)
@@ -64,8 +75,22 @@ def contours(material: Material) -> Figure | None:
         "parameter": np.array(result.free),
         **{f"correlation_{n}": correlation[i] for i, n in enumerate(result.free)},
     }
+    if profiled is not None:
+        data |= {f"{name}_of_profile": x.ravel() for name, x in zip(profiled.names, (profiled.first, profiled.second))}
+        data["delta_chi2"] = profiled.delta_chi2.ravel()
+    key = "caption.contours" if profiled is None else "caption.contours_profile"
     model = words.either(f"model.{result.model}", result.model)
-    return Figure("contours", words("caption.contours", model=model), draw("contours", "en", 2.7, paint), data)
+    return Figure("contours", words(key, model=model), draw("contours", "en", 2.7, paint), data)
+
+
+def _profile(material: Material, result: Any, first: str, second: str) -> Contour | None:
+    """Δχ² with all other parameters fitted anew; None for a long record, where it would take longer than the report."""
+    from toolkit.fitting.contour import contour
+
+    if result.problem is None or material.t.size > _MOST_POINTS:
+        return None
+    found = contour(result, first, second, reach=3.0, count=13)
+    return found if np.isfinite(found.delta_chi2).mean() > 0.5 else None
 
 
 def _covariance(result: Any) -> np.ndarray | None:
