@@ -130,8 +130,9 @@ def test_misuse_is_named(call, words):
 
 
 _TWO_PROCESSES = """
-import sys, numpy as np
-from toolkit.motion import build_equation
+import os, sys, numpy as np
+from toolkit.motion import build_equation, compiled
+compiled.keeps_objects &= "PENDULAB_NUMBA_CACHE" not in os.environ
 e = build_equation(["linear_drag"], small_angle=False)
 s = e.solve({"mass_kg": .25, "length_m": .5, "g_m_per_s2": 9.8, "linear_drag.k_d_kg_per_s": .1}, 1.0, 0.0, np.linspace(0, 1, 5))
 print(repr(float(s.theta_rad[-1])), "sympy" in sys.modules)
@@ -152,6 +153,22 @@ def test_code_is_shared_by_processes_that_start_at_once(tmp_path):
     assert len(answers) == 1
     assert not list((tmp_path / "cache").glob("*.tmp"))
     assert start().communicate()[0].split() == [*answers, "False"]
+
+
+def test_code_kept_by_numba_itself_gives_the_same_digits(tmp_path):
+    """What systems do on which bare objects have not been tried, in a process that compiles and in one that finds it."""
+    environment = {**os.environ, "PENDULAB_CACHE": str(tmp_path)}
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", _TWO_PROCESSES],
+            env={**environment, **more},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()[0]
+        for more in ({}, {"PENDULAB_NUMBA_CACHE": "1"}, {"PENDULAB_NUMBA_CACHE": "1"})
+    ]
+    assert said[0] == said[1] == said[2]
 
 
 def test_a_cache_that_cannot_be_written_is_replaced_by_a_temporary_one(tmp_path):

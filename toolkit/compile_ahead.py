@@ -44,8 +44,10 @@ def fit_a_made_up_swing() -> None:
 def _mark() -> Path:
     from importlib.metadata import version
 
-    from toolkit import __version__
     from toolkit.motion.compiled import cache_folder, key_of
 
-    versions = (__version__, version("numba"), version("numpy"), sys.version, str(Path(__file__).resolve()))
-    return cache_folder() / f"ready-{key_of(*versions)}"
+    package = Path(__file__).resolve().parent
+    texts = [
+        file.read_bytes() for room in ("motion", "models", "effects") for file in sorted((package / room).rglob("*.py"))
+    ]
+    return cache_folder() / f"ready-{key_of(version('numba'), version('numpy'), sys.version, *texts)}"

@@ -42,7 +42,9 @@ def cache_folder() -> Path:
     candidates.append(Path(tempfile.gettempdir()) / f"pendulab-{os.getuid() if hasattr(os, 'getuid') else 'user'}")
     for folder in candidates:
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
+                continue  # somebody else's: what lies there would be run
             with tempfile.TemporaryFile(dir=folder):
                 return folder
         except OSError:
@@ -77,7 +79,7 @@ def load(name: str) -> ModuleType | None:
     spec = importlib.util.spec_from_file_location(f"pendulab_{name}", path)
     assert spec is not None
     assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)  # Numba's cache finds it by name
     try:
         spec.loader.exec_module(module)
     except (SyntaxError, OSError):
@@ -136,20 +138,38 @@ def machine_code(name: str, source: Callable[[], tuple[list[Any], Any, Any]]) ->
     process that finds everything compiled imports llvmlite alone, in a tenth of the time that Numba takes.
     The function is called as Numba calls its own: first an address for its (empty) result and one for an exception.
     """
+    if not keeps_objects:
+        seen = cache_folder() / f"{name}.seen"
+        made = _compile(source, cache=True, tell=not seen.exists())
+        seen.touch()
+        _loaded.append(made)
+        address: int = made._library.get_pointer_to_function(made.native_name.removeprefix("cfunc."))
+        return address
     processor = _processor()
     path = cache_folder() / f"{name}_{processor.key}.o"
-    address = processor.load(path, name)
-    if address is None:
-        listener("compiling the equation of motion (once; later runs find it ready)")
-        import numba
-
-        kinds, fastmath, function = source()
-        made = numba.cfunc(numba.void(*kinds), error_model="numpy", fastmath=fastmath)(function)
+    found = processor.load(path, name)
+    if found is None:
+        made = _compile(source)
         _write(path, processor.emit(made.inspect_llvm(), made.native_name.removeprefix("cfunc."), name))
-        address = processor.load(path, name)
-    if address is None:
+        found = processor.load(path, name)
+    if found is None:
         raise JobError(f"cannot keep compiled equations in {cache_folder()}; set PENDULAB_CACHE to a folder")
-    return address
+    return found
+
+
+keeps_objects = sys.platform.startswith("linux")
+"""Whether compiled code is kept as bare objects. Only Linux has been tried; elsewhere Numba's own cache is slower but safe."""
+
+_loaded: list[Any] = []  # code must outlive its address
+
+
+def _compile(source: Callable[[], tuple[list[Any], Any, Any]], cache: bool = False, tell: bool = True) -> Any:
+    if tell:
+        listener("compiling the equation of motion (once; later runs find it ready)")
+    import numba
+
+    kinds, fastmath, function = source()
+    return numba.cfunc(numba.void(*kinds), error_model="numpy", fastmath=fastmath, cache=cache)(function)
 
 
 _C_MATH = ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pow", "memcpy", "memmove", "memset")
