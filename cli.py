@@ -388,6 +388,7 @@ def trackers() -> None:
 
 def main() -> None:
     """Run the command; every failure is one line on stderr and an exit code."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # our matrices are small: threads would only wait for each other
     for stream in (sys.stdout, sys.stderr):  # Thai and θ also where the console's own encoding cannot
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
