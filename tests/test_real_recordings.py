@@ -21,12 +21,13 @@ def test_a_red_apple_on_a_string(shared_data):
     assert len(track.frame) == 1299
     assert track.ok.mean() >= 0.99
     assert track.pivot_px[1] < 0  # above the frame
-    stamp_rate = (len(track.frame) - 1) / float(track.t_s[-1])
-    assert stamp_rate == pytest.approx(60000 / 1001, rel=1e-6)
-    # The sine that fits best has the mean period. The published 2.0841 s counted frames at the header's mean rate
-    # (59.77 a second), while the frames' own stamps, which we use, are even at 59.94: compare on their clock.
+    # The stamps are even at 59.94 a second, the header's mean rate is 59.77: frames are missing that no stamp tells of.
+    # Where the motion leaps by whole frames they are placed, which may not take the clock past the header's.
+    rate = (len(track.frame) - 1) / float(track.t_s[-1])
+    assert header_rate * (1 - 1e-6) < rate < 60000 / 1001
+    # The sine that fits best has the mean period. The published 2.0841 s counted frames at the header's rate.
     mean_period_s = 2 * math.pi / analysis.fits["small_angle_linear_drag"].parameters["omega_g"].value
-    assert mean_period_s * stamp_rate / header_rate == pytest.approx(2.084, rel=5e-4)
+    assert mean_period_s * rate / header_rate == pytest.approx(2.084, rel=5e-4)
     assert any("59.768" in sentence and "59.94" in sentence for sentence in analysis.series.meta["warnings"])
 
 
