@@ -214,3 +214,19 @@ def test_red_apple(shared_data):
 def test_no_invented_pendulum(shared_data, name):
     with pytest.raises(JobError, match="--bob"):
         track(shared_data / "redapple" / f"{name}_480p.mov")
+
+
+def test_a_darker_thing_that_passes_by_is_not_taken_for_the_bob(tmp_path):
+    """A ball of more contrast rolls across in a straight line, before the pendulum: only what swings is followed."""
+    rng, t = np.random.default_rng(3), np.arange(180) / FPS
+    x, y = PIVOT[0] + LENGTH * np.sin(angles(t)), PIVOT[1] + LENGTH * np.cos(angles(t))
+    rows, columns = np.mgrid[0:H, 0:W]
+    pictures = []
+    for k in range(t.size):
+        picture = draw(x[k], y[k], rng)
+        picture[np.hypot(columns - (-20 + 120 * t[k]), rows - 60) < 15] = 20
+        pictures.append(picture)
+    found = track(film(tmp_path / "passing.mp4", pictures))
+    assert found.ok.mean() > 0.9
+    error = np.hypot(found.x_px - x, found.y_px - y)[found.ok]
+    assert error.max() < 1.0

@@ -194,6 +194,10 @@ def _swing_of(batch: list[Frame], points: dict[int, tuple[float, float]], look: 
     wandering = 0.12 if len(points) > 0.9 * len(batch) else 0.05
     if swing is None or swing.rms_px > max(wandering * extent, 0.5):
         return None
+    line = np.column_stack([np.ones(t.size), t - t[0]])
+    straight = np.column_stack([x, y]) - line @ np.linalg.lstsq(line, np.column_stack([x, y]), rcond=None)[0]
+    if np.sqrt(np.mean(np.sum(straight**2, axis=1))) < 1.5 * swing.rms_px + 0.02 * extent:
+        return None  # it passes by; what swings that slowly is found in more of the clip
     return swing
 
 
