@@ -216,17 +216,16 @@ def test_no_invented_pendulum(shared_data, name):
         track(shared_data / "redapple" / f"{name}_480p.mov")
 
 
-def test_a_darker_thing_that_passes_by_is_not_taken_for_the_bob(tmp_path):
-    """A ball of more contrast rolls across in a straight line, before the pendulum: only what swings is followed."""
-    rng, t = np.random.default_rng(3), np.arange(180) / FPS
-    x, y = PIVOT[0] + LENGTH * np.sin(angles(t)), PIVOT[1] + LENGTH * np.cos(angles(t))
-    rows, columns = np.mgrid[0:H, 0:W]
-    pictures = []
-    for k in range(t.size):
-        picture = draw(x[k], y[k], rng)
-        picture[np.hypot(columns - (-20 + 120 * t[k]), rows - 60) < 15] = 20
-        pictures.append(picture)
-    found = track(film(tmp_path / "passing.mp4", pictures))
-    assert found.ok.mean() > 0.9
-    error = np.hypot(found.x_px - x, found.y_px - y)[found.ok]
-    assert error.max() < 1.0
+def test_what_passes_by_is_no_slow_swing_and_a_swing_is_one():
+    from types import SimpleNamespace
+
+    from toolkit.trackers.localiser import Look
+    from toolkit.tracking.acquire import _swing_of
+
+    t, noise = np.arange(96) / FPS, np.random.default_rng(3).normal(0, 0.1, (2, 96))
+    batch = [SimpleNamespace(t_s=float(s)) for s in t]
+    rolling = 20 + 120 * t + noise[0], 60 + 5 * t + noise[1]
+    swinging = PIVOT[0] + LENGTH * np.sin(angles(t)) + noise[0], PIVOT[1] + LENGTH * np.cos(angles(t)) + noise[1]
+    assert _swing_of(batch, dict(enumerate(zip(*rolling))), Look(11.0)) is None
+    found = _swing_of(batch, dict(enumerate(zip(*swinging))), Look(11.0))
+    assert found.period_s == pytest.approx(2 * np.pi / OMEGA, rel=0.02)
