@@ -334,10 +334,9 @@ class Follower:
             if np.isfinite(place.x_px):
                 return place
         wide = fit_disc(patch, self.look._replace(noise=np.inf), guess, soften=2.5, turns=12)
-        if wide is None:
-            return NOWHERE
-        near = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
-        return self.localiser.locate(patch, self.look, near)
+        if wide is not None:  # beside a shadow, a wide look may find nothing where a close one does
+            guess = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
+        return self.localiser.locate(patch, self.look, guess)
 
     def _look_around(
         self, frame: Frame, guess: Guess, place: Place, patch: Patch | None
