@@ -1,102 +1,184 @@
-"""Edge fit: where the outline is crossed along rays from the centre, and the circle through these points.
+"""Outline fit: the circle where the picture departs from the background, whatever is drawn on the bob.
 
-It asks nothing of the inside of the bob, so a pattern or a highlight does not disturb it; motion blur does.
+Along rays from the centre, the picture less the background is a level outside and unknown levels inside: the bob's
+shells, thinnest at its rim, for on a ball a pattern is foreshortened there to less than a pixel. These levels are random
+with a wide prior; integrated out (Gaussian marginal likelihood) they leave how likely each place of the outline is on each
+ray. The centre is the likeliest over all rays; a ray that disagrees with the others counts little (Cauchy).
 """
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 
-_RAYS = 72
+_STEP = 0.5  # px between samples of a ray
+_SHIFTS = np.linspace(-1.8, 1.8, 25)  # places of the outline on a ray that are tried, px
+_DEPTHS = np.array([0.0, 0.4, 0.9, 1.6, 2.6, 4.0])  # where the shells begin, px within the outline
+_FAR = 9.0  # what a ray may disagree by, in units of twice the log-likelihood, before it counts less
+_WIDTHS = 4  # classes of blur along the ray
+# standard deviations, the first three in units of the contrast:
+_CHANGE = 0.3  # of a shell's level against the next one's
+_OUTSIDE = 0.25  # of the level beyond the outline (a shadow)
+_FLOOR = 0.03  # of what a codec and the edge's true shape leave
+_RADIUS = 0.3  # px, of the radius about the look's
 
 
 def locate(patch: Patch, look: Look, guess: Guess) -> Place:
-    """The centre of the circle through the outline; each crossing is the centroid of the brightness step on its ray."""
-    cx, cy = guess.x_px - patch.x_px, guess.y_px - patch.y_px
-    streak = float(np.hypot(guess.streak_x_px, guess.streak_y_px))
-    narrow = min(0.5 * look.radius_px, 2 * look.edge_px + 1 + 0.5 * streak)
-    width = min(0.7 * look.radius_px, narrow + look.edge_px + 2)
-    angles = (np.arange(_RAYS) + 0.5) * 2 * np.pi / _RAYS
+    """The centre of the likeliest outline; the radius may differ a little from the look's."""
+    fit = fit_outline(patch, look, guess)
+    return NOWHERE if fit is None else fit[0]
+
+
+def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] | None:
+    """The place and the radius in px; None where too little of an outline is seen."""
+    import cv2
+
+    contrast = abs(look.contrast) or float(np.ptp(patch.image - patch.back))
+    if not contrast > 0:
+        return None
+    centre = np.array([guess.x_px - patch.x_px, guess.y_px - patch.y_px], float)
+    picture = np.ascontiguousarray(patch.image - patch.back, np.float32)
+    quiet = 1.4826 * float(np.median(np.abs(picture - np.median(picture))))
+    noise = float(np.clip(quiet / contrast, _FLOOR, 0.2))
+    count = int(max(32, 2 * np.pi * look.radius_px / 0.9))
+    angles = (np.arange(count) + 0.5) * 2 * np.pi / count
     if np.isfinite(guess.string_rad):
         half = min(0.9, 0.2 + 3.0 / look.radius_px)
         angles = angles[np.abs((angles - guess.string_rad + np.pi) % (2 * np.pi) - np.pi) > half]
     ux, uy = np.cos(angles), np.sin(angles)
-    sign = -np.sign(look.contrast) or 1.0
-    radius = look.radius_px
-    for turn in range(6):
-        r = np.arange(radius - width, radius + width + 0.125, 0.25)
-        x, y = cx + ux[:, None] * r, cy + uy[:, None] * r
-        inside = (x >= 0) & (y >= 0) & (x < patch.image.shape[1] - 1.001) & (y < patch.image.shape[0] - 1.001)
-        profile = _sampled(patch.image, x, y)
-        inside = inside.all(axis=1)
-        if width == narrow:
-            found, height = _half_way(profile, r, sign, look.edge_px)
-        else:
-            found, height = _steepest(profile, r, sign, 1.5 + 2 * look.edge_px + 0.3 * streak)
-        good = inside & (height > (0.2 * abs(look.contrast) if look.contrast else 0.5 * np.median(height)))
-        if good.sum() < 12:
-            return NOWHERE
-        keep = good.copy()
-        design = np.column_stack([ux, uy, np.ones(ux.size)])
-        for _ in range(3):
-            a = np.linalg.lstsq(design[keep], found[keep], rcond=None)[0]
-            rest = found - design @ a
-            spread = 1.4826 * float(np.median(np.abs(rest[keep]))) + 0.02
-            keep = good & (np.abs(rest) < 3.5 * spread)
-            if keep.sum() < 10:
-                return NOWHERE
-        step = float(np.hypot(a[0], a[1]))
-        cx, cy = cx + float(a[0]), cy + float(a[1])
-        if width == narrow and step < 0.02:
+    streak = np.abs(guess.streak_x_px * ux + guess.streak_y_px * uy)
+    longest = float(np.round(np.hypot(guess.streak_x_px, guess.streak_y_px)))  # rounded, so that few kinds of ray occur
+    classes = (
+        np.minimum((streak / max(longest, 1e-9) * _WIDTHS).astype(int), _WIDTHS - 1)
+        if longest > 0.5
+        else 0 * angles.astype(int)
+    )
+    design = np.column_stack([ux, uy, np.ones(ux.size)])
+    level = float(2.0 ** np.round(np.log2(noise)))
+    change = _CHANGE if not look.even else 0.25 * _CHANGE
+    wide = max(1.0, look.radius_px / 6)
+    for turn in range(10):
+        unit = (
+            wide if turn < 2 else 1.0
+        )  # coarse at first: what is drawn is mistaken for the outline less, and the reach is far
+        edge = float(round(max(look.edge_px / unit, 0.3), 2))
+        r = _grid(edge, longest / unit)
+        x = centre[0] + ux[:, None] * (look.radius_px + unit * r)
+        y = centre[1] + uy[:, None] * (look.radius_px + unit * r)
+        inside = ((x >= 0) & (y >= 0) & (x <= picture.shape[1] - 1) & (y <= picture.shape[0] - 1))[
+            :, r < 2.5 * edge + 0.5
+        ].all(axis=1)
+        if inside.sum() < 12:
+            return None
+        profile = (
+            cv2.remap(
+                picture, x.astype(np.float32), y.astype(np.float32), cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+            )
+            / contrast
+        )
+        cost = np.empty((angles.size, _SHIFTS.size))
+        for k in range(_WIDTHS):
+            rows = classes == k
+            if rows.any():
+                blur = float(round((k + 0.5) / _WIDTHS * longest / unit * 2) / 2) if longest > 0.5 else 0.0
+                whitened = _likelihood(edge, float(longest / unit), blur, level, change)
+                cost[rows] = _misfits(profile[rows], whitened, float(np.sign(look.contrast)))
+        least = cost.min(axis=1)
+        scale = max(1.0, float(np.median(least[inside])) / r.size)
+        cost = (cost - least[:, None]) / scale
+        found, info, apart = _likeliest(cost, design, inside)
+        step = unit * float(np.hypot(found[0], found[1]))
+        centre += unit * np.clip(found[:2], -1.5, 1.5)
+        if unit == 1 and step < 0.02:
             break
-        if turn == 5 and step > 0.3:
-            return NOWHERE
-        if step < 0.5:
-            width = narrow  # near by, what is drawn on the bob is kept out
-    scatter = float(np.sqrt(np.sum(rest[keep] ** 2) / max(1, keep.sum() - 3)))
-    covariance = np.linalg.inv(design[keep].T @ design[keep]) * scatter**2
-    sigma = np.sqrt(np.diag(covariance))
-    slope = float(np.median(height[keep])) / max(1.0, 2.5 * look.edge_px)
-    contrast = -sign * float(np.median(height[keep]))
-    return Place(
-        cx + patch.x_px, cy + patch.y_px, max(float(sigma[0]), 1e-4), max(float(sigma[1]), 1e-4), scatter * slope,
-        float(keep.mean()), contrast,
+    if step > 0.3:
+        return None
+    sigma = np.sqrt(np.diag(np.linalg.inv(info)))
+    within = profile[:, (r < -0.5 - edge) & (r > -3.0 - edge)].mean(axis=1)
+    beyond = profile[:, -3:].mean(axis=1)
+    seen = inside & (apart < 2 * _FAR) & (np.abs(within - beyond) > max(0.12, 3 * noise))
+    if seen.sum() < 10:
+        return None
+    place = Place(
+        float(centre[0]) + patch.x_px, float(centre[1]) + patch.y_px, max(float(sigma[0]), 1e-4), max(float(sigma[1]), 1e-4),
+        contrast * noise * float(np.sqrt(scale)), float(seen.mean()),
+        float(np.median((within - beyond)[seen])) * contrast,
     )  # fmt: skip
+    return place, look.radius_px + float(found[2])
 
 
-def _sampled(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Bilinear values of the image at (x, y)."""
-    ix = np.clip(x.astype(int), 0, image.shape[1] - 2)
-    iy = np.clip(y.astype(int), 0, image.shape[0] - 2)
-    fx, fy = x - ix, y - iy
-    top = image[iy, ix] * (1 - fx) + image[iy, ix + 1] * fx
-    bottom = image[iy + 1, ix] * (1 - fx) + image[iy + 1, ix + 1] * fx
-    return top * (1 - fy) + bottom * fy
+def _likeliest(cost: np.ndarray, design: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x, y and radius (px off the present ones) of the least robust sum, its curvature, and each ray's misfit there."""
+    h = _SHIFTS[1] - _SHIFTS[0]
+    slope = np.gradient(cost, h, axis=1)
+    curve = np.gradient(slope, h, axis=1)
+    a = np.zeros(3)
+    rows = np.arange(design.shape[0])
+    prior = np.diag([1e-6, 1e-6, 1 / _RADIUS**2])
+    for _ in range(30):
+        at = np.clip((design @ a - _SHIFTS[0]) / h, 0, _SHIFTS.size - 1.001)
+        i = at.astype(int)
+        f = at - i
+        value, first, second = (v[rows, i] * (1 - f) + v[rows, i + 1] * f for v in (cost, slope, curve))
+        weight = inside / (1 + np.maximum(value, 0) / _FAR)
+        bend = np.maximum(second, first**2 / (2 * np.maximum(value, 1e-3) + 1.0)) * weight
+        info = 0.5 * (design.T * bend) @ design + prior
+        step = -np.linalg.solve(info, 0.5 * design.T @ (first * weight) + prior @ a)
+        step *= min(1.0, 0.3 / max(1e-9, np.abs(step).max()))
+        a = a + step
+        if np.abs(step).max() < 1e-3:
+            break
+    return a, info, np.where(inside, value, np.inf)
 
 
-def _steepest(profile: np.ndarray, r: np.ndarray, sign: float, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Centroid of the brightness step about the steepest place of each ray, and the step's height."""
-    rise = np.clip(sign * np.diff(profile, axis=1), 0, None)
-    middle = 0.5 * (r[1:] + r[:-1])
-    peak = np.argmax(_blurred(rise), axis=1)
-    weight = rise * (np.abs(middle[None, :] - middle[peak][:, None]) <= reach)
-    height = weight.sum(axis=1)
-    return (weight * middle).sum(axis=1) / np.maximum(height, 1e-9), height
+def _grid(edge: float, longest: float) -> np.ndarray:
+    """Where rays are sampled, px beyond the outline."""
+    reach = 2.2 * edge + 0.5 * longest
+    return np.arange(-_DEPTHS[-1] - min(reach, 3.0), reach + 2.6, _STEP)
 
 
-def _half_way(profile: np.ndarray, r: np.ndarray, sign: float, edge_px: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where each ray leaves the bob: its level just inside the outline, against that just outside, by the area between."""
-    few = 1 + int(edge_px / (r[1] - r[0]))
-    within, beyond = profile[:, :few].mean(axis=1), profile[:, -few:].mean(axis=1)
-    height = sign * (beyond - within)
-    area = np.trapezoid(sign * (beyond[:, None] - profile), r, axis=1)
-    return r[0] + area / np.where(height > 0, height, np.inf), height
+def _misfits(profile: np.ndarray, whitened: tuple[np.ndarray, np.ndarray, np.ndarray], sign: float) -> np.ndarray:
+    """Minus twice the log-likelihood of each place of the outline, (rays, places), up to a constant."""
+    whiten, mean, volume = whitened
+    places, size, _ = whiten.shape
+    white = whiten.reshape(places * size, size) @ profile.T
+    white -= (sign * mean).reshape(-1, 1)
+    white *= white
+    return np.asarray(white.reshape(places, size, -1).sum(axis=1).T + volume)
 
 
-def _blurred(rows: np.ndarray) -> np.ndarray:
-    return rows + np.pad(rows, ((0, 0), (1, 0)))[:, :-1] + np.pad(rows, ((0, 0), (0, 1)))[:, 1:]
+@lru_cache(maxsize=64)
+def _likelihood(
+    edge: float, longest: float, blur: float, noise: float, change: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For each place of the outline: what makes its profiles white noise, the mean so treated, and the volume's logarithm.
+    All in units of the contrast."""
+    from scipy.special import erf
+
+    r = _grid(edge, longest)
+    ends = np.linspace(-0.5, 0.5, 1 + 2 * int(np.ceil(blur))) * blur
+
+    def covered(rim: float) -> np.ndarray:
+        return np.mean([0.5 + 0.5 * erf((rim + e - r) / (edge * np.sqrt(2))) for e in ends], axis=0)
+
+    walk = np.tril(np.ones((_DEPTHS.size, _DEPTHS.size)))  # each shell's level is the one's beyond it, changed
+    levels = walk @ np.diag([0.5, *([change] * (_DEPTHS.size - 1))]) ** 2 @ walk.T
+    whiten, mean, volume = [], [], []
+    for shift in _SHIFTS:
+        rims = np.array([covered(shift - d) for d in _DEPTHS])
+        shells = rims - np.vstack([rims[1:], np.zeros(r.size)])
+        beyond = 1 - rims[0]
+        spread = shells.T @ levels @ shells + _OUTSIDE**2 * np.outer(beyond, beyond)
+        spread += noise**2 * (0.5 ** (np.abs(r[:, None] - r) / 0.5))
+        lower = np.linalg.cholesky(spread)
+        inverse = np.linalg.inv(lower)
+        whiten.append(inverse)
+        mean.append(inverse @ rims[0])
+        volume.append(2 * np.log(np.diag(lower)).sum())
+    return np.array(whiten), np.array(mean), np.array(volume)
 
 
-LOCALISER = Localiser("edge", "circle through the sub-pixel outline; for bobs with a pattern or a highlight", locate)
+LOCALISER = Localiser("edge", "likeliest outline before the background; for bobs with a pattern or a highlight", locate)

@@ -238,8 +238,9 @@ class Follower:
                 continue
             t, x, y, misfit, visible = np.array(found).T
             swing = fit_swing(t, x, y, np.full(t.size, 0.1), _restarted(self.swing, t[0]))
-            if swing is not None and swing.rms_px * (0.9 if name == "disc" else 1.0) < least:
-                best, least = candidate, swing.rms_px * (0.9 if name == "disc" else 1.0)
+            favour = 0.9 if name == "disc" and self.look.even else 1.0
+            if swing is not None and swing.rms_px * favour < least:
+                best, least = candidate, swing.rms_px * favour
                 self.ordinary_misfit = float(np.percentile(misfit, 90))
                 # a rolling shutter shears the outline where the bob is fast: what is ordinary is not hidden
                 self.ordinary_visible = float(np.clip(np.median(visible) - 0.1, 0.65, 0.85))
