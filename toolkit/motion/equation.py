@@ -66,11 +66,6 @@ class Equation:
         return self.small_angle and all(e.linear for e in self.effects) and drives <= 1
 
     @cached_property
-    def is_bare(self) -> bool:
-        """The pendulum alone, with nothing acting on it: the exact solution is known."""
-        return not self.small_angle and all(e.name == "slack_string" for e in self.effects)
-
-    @cached_property
     def latex(self) -> str:
         """The equation of motion as LaTeX, printed by the same terms that are compiled."""
         names = dict(SCENE_SYMBOLS)

@@ -81,11 +81,6 @@ class View:
         return float(where[0][0]), float(where[1][0])
 
     @property
-    def straight_pivot_px(self) -> tuple[float, float]:
-        """The pivot where a lens that does not bend would show it."""
-        return self["pivot_x"], self["pivot_y"]
-
-    @property
     def pivot_sigma_px(self) -> tuple[float, float]:
         """Standard uncertainties of the pivot in the model that was chosen."""
         return float(np.sqrt(self.square_covariance[0, 0])), float(np.sqrt(self.square_covariance[1, 1]))
