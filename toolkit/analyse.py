@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -127,16 +128,11 @@ def analyse(
         timings[stage] = now - clock
         clock = now
 
-    ahead = compile_ahead() if is_video(path) else None
-    try:
+    with compile_ahead() if is_video(path) else nullcontext() as ahead:
         series, found = measure(path, scene, progress=progress, **measuring)
-    except BaseException:
         if ahead is not None:
-            ahead.kill()
-        raise
-    if ahead is not None:
-        progress("compiling the equations, this once", 0.0)
-        ahead.wait()
+            progress("compiling the equations, this once", 0.0)
+            ahead.result()
     scene = _with_what_the_recording_says(scene, series)
     stage_done("measure")
     from toolkit.diagnose import diagnose

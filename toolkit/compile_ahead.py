@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
+from toolkit.beside import Beside
 
-def compile_ahead() -> subprocess.Popen[bytes] | None:
-    """Start a process that fits every model of the ladder to a made-up swing, so that their code is on the disk.
 
-    None where that was done before by these versions, or where no second Python can be started. Wait for the process
-    before fitting: what it compiles need not be compiled twice.
+def compile_ahead() -> AbstractContextManager[Beside | None]:
+    """Start to fit every model of the ladder to a made-up swing elsewhere, so that their code is on the disk.
+
+    None is inside where that was done before by these versions. Ask for the result before fitting: what is compiled
+    there need not be compiled twice.
     """
-    if not sys.executable or _mark().exists():
-        return None
-    package = str(Path(__file__).resolve().parents[1])
-    code = (
-        f"import sys; sys.path.insert(0, {package!r}); from toolkit.compile_ahead import fit_a_made_up_swing as f; f()"
-    )
-    quiet = subprocess.DEVNULL
-    try:
-        return subprocess.Popen([sys.executable, "-c", code], stdin=quiet, stdout=quiet, stderr=quiet)
-    except OSError:
-        return None
+    return nullcontext() if _mark().exists() else Beside(fit_a_made_up_swing)
 
 
 def fit_a_made_up_swing() -> None:

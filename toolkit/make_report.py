@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 from toolkit.analyse import Analysis, analyse, write_analysis
+from toolkit.beside import Beside
 from toolkit.output import whole_folder
 from toolkit.progress import Progress, silent
 from toolkit.scene import Scene
@@ -40,8 +41,7 @@ def make_report(
         analysis = analyse(recording, scene, models=models, progress=progress, **measuring)
         write_analysis(analysis, folder)
         progress("writing the report", 0.0)
-        with ThreadPoolExecutor(1) as beside:  # encoding a film leaves Python free to draw figures
-            film = beside.submit(_write_film, analysis, folder) if overlay else None
+        with _film(analysis, folder) if overlay else nullcontext() as film:
             written = write_report(build_report(analysis, lang=lang), folder, formats)
             if film is not None:
                 progress("writing the overlay", 0.5)
@@ -49,8 +49,10 @@ def make_report(
     return analysis, [out / path.name for path in written]
 
 
-def _write_film(analysis: Analysis, folder: Path) -> None:
-    if analysis.track is not None and analysis.video is not None:
-        from toolkit.overlay import write_overlay
+def _film(analysis: Analysis, folder: Path) -> AbstractContextManager[Beside | None]:
+    """The overlay, being written while figures are drawn; nothing for a recording that is no video."""
+    if analysis.track is None or analysis.video is None:
+        return nullcontext()
+    from toolkit.overlay import write_overlay
 
-        write_overlay(analysis.video, analysis.track, folder / "overlay.mp4", analysis.best.theta_rad)
+    return Beside(write_overlay, analysis.video, analysis.track, folder / "overlay.mp4", analysis.best.theta_rad)
