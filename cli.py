@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 app = typer.Typer(
     name="pendulab",
     help="From a phone video of a pendulum to θ(t) with error bars, fitted models, and a report.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -112,16 +111,24 @@ def takes(**parts: Callable[..., Any]) -> Callable[[Callable[..., None]], Callab
     return add_options
 
 
-@app.callback()
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from toolkit import __version__
+
+        typer.echo(f"pendulab {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
 def about(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)] = False,
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and stop.", is_eager=True, callback=_print_version)
+    ] = False,
 ) -> None:
     """From a phone video of a pendulum to θ(t) with error bars, fitted models, and a report."""
-    if version:
-        from importlib.metadata import version as installed
-
-        typer.echo(f"pendulab {installed('pendulab')}")
-        raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
 
 
 @app.command()
@@ -393,7 +400,7 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
     try:
-        code = app(standalone_mode=False)
+        code = app(prog_name="pendulab", standalone_mode=False)
     except (typer.Abort, KeyboardInterrupt):
         code = 130
     except BrokenPipeError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -276,6 +277,13 @@ def test_batch_makes_one_report_a_recording_and_goes_on_past_a_bad_one(tmp_path)
     assert "ann/report.html" in page
     assert (tmp_path / "out" / "ann" / "report.html").is_file()
     refused(pendulab("batch", tmp_path / "nowhere", "--out", tmp_path / "o"), 1, "nowhere")
+
+
+def test_version_and_bare_command():
+    version = pendulab("--version")
+    assert version.returncode == 0 and re.fullmatch(r"pendulab \d+\.\d+\S*\n", version.stdout), version
+    bare = pendulab()
+    assert bare.returncode == 0 and bare.stdout == pendulab("--help").stdout
 
 
 def test_help_of_every_command():
