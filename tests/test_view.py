@@ -9,7 +9,7 @@ from toolkit.render import stage
 from toolkit.scene import Scene
 from toolkit.tracking.clock import place_lost_frames
 from toolkit.tracking.swing import Swing, fit_swing, start_swing
-from toolkit.tracking.view import Lines, fit_view
+from toolkit.tracking.view_fit import Lines, fit_view
 
 SIGMA = 0.03
 
@@ -30,18 +30,27 @@ def seen(**effects):
         "effects": {"linear_drag": {"k_d_kg_per_s": 2e-3}},
         "camera": {**camera, **effects},
     }
-    truth = stage(Scene.from_dict(table)).truth
+    studio = stage(Scene.from_dict(table))
+    truth = studio.truth
     rng = np.random.default_rng(5)
     t, n = truth.stamp_s, truth.t_s.size
     x, y = truth.x_px + rng.normal(0, SIGMA, n), truth.y_px + rng.normal(0, SIGMA, n)
-    some = np.arange(0, n, 3)
-    dx, dy = (truth.x_px - truth.pivot_px[:, 0])[some], (truth.y_px - truth.pivot_px[:, 1])[some]
-    middle = 0.5 * (truth.pivot_px[some] + np.stack([truth.x_px, truth.y_px], axis=1)[some])
-    turn, place = np.full(some.size, 2e-4), np.full(some.size, 0.02)
-    lines = Lines(*middle.T, np.arctan2(dx, dy) + rng.normal(0, 2e-4, some.size), turn, place)
+    lines = strings(studio, t[::3], rng)
     sigma = np.full(n, SIGMA)
     view = fit_view(t, x, y, sigma, sigma, start_swing(t, x, y), (640, 480), lines)
     return view, truth, (t, x, y)
+
+
+def strings(studio, t, rng):
+    """Straight lines fitted to the string as the picture shows it, bent by lens and shutter as that may be."""
+    fitted = []
+    for when in t:
+        (x, y), _ = (a.T for a in studio._see(np.linspace(0.05, 0.9, 60), np.full(60, when)))
+        slope, x0 = np.polyfit(y, x, 1)
+        middle = 0.5 * (y[0] + y[-1])
+        half = 0.5 * np.hypot(x[-1] - x[0], y[-1] - y[0])
+        fitted.append((x0 + slope * middle, middle, np.arctan(slope) + rng.normal(0, 2e-4), 2e-4, 0.02, half, when))
+    return Lines(*np.array(fitted).T)
 
 
 def errors(view, truth, places):

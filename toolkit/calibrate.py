@@ -23,7 +23,8 @@ from toolkit.series import ThetaSeries
 from toolkit.track import LOST, PREDICTED, Track
 from toolkit.tracking.pivot import PivotEstimate, arc_pivot, line_pivot
 from toolkit.tracking.swing import start_swing
-from toolkit.tracking.view import Lines, View, fit_view
+from toolkit.tracking.view import View
+from toolkit.tracking.view_fit import Lines, fit_view
 
 __all__ = ["arc_pivot", "calibrate", "line_pivot", "write_calibration_json"]
 
@@ -314,10 +315,10 @@ def _lines(track: Track, kept: np.ndarray) -> Lines | None:
     """The string's lines on the measured frames; None where there are few."""
     if track.meta.get("string_angle_rad") is None:
         return None
-    names = ("x_px", "y_px", "angle_rad", "angle_sigma_rad", "sigma_px")
-    columns = [np.asarray(track.meta[f"string_{n}"])[kept] for n in names]
-    good = np.isfinite(columns[2])
-    return Lines(*(c[good] for c in columns)) if good.sum() >= 8 else None
+    names = ("x_px", "y_px", "angle_rad", "angle_sigma_rad", "sigma_px", "half_px")
+    lines = Lines(*(np.asarray(track.meta[f"string_{n}"])[kept] for n in names), t_s=track.t_s[kept])
+    good = np.isfinite(lines.angle_rad)
+    return lines.of(good) if good.sum() >= 8 else None
 
 
 def _string_pivot(track: Track, kept: np.ndarray) -> PivotEstimate | None:

@@ -20,9 +20,11 @@ from toolkit.tracking.clock import even_times, out_of_time, place_lost_frames
 from toolkit.tracking.follow import Follower
 from toolkit.tracking.scatter import Factors, true_sigma
 from toolkit.tracking.shake import Shake
+from toolkit.tracking.string_line import seen_half
 from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.tracking.verdict import poor_motion, require_pendulum
-from toolkit.tracking.view import Lines, View, fit_view
+from toolkit.tracking.view import View
+from toolkit.tracking.view_fit import Lines, fit_view
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
@@ -221,10 +223,13 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     for a in (x, y, sx, sy):
         a[~good] = np.nan
     time_sigma = video.tick_s / np.sqrt(12) if video.tick_s > 2e-4 and not evened else 0.0
-    strings = np.full((t.size, 5), np.nan)
+    strings = np.full((t.size, 6), np.nan)
     for k, line in r.string.items():
-        strings[k] = line
-    lines = strings[good & np.isfinite(strings[:, 2])]
+        strings[k, :5] = line
+    strings[:, 5] = seen_half(np.hypot(strings[:, 0] - x, strings[:, 1] - y), follower.look.radius_px)
+    straight = good & np.isfinite(strings[:, 5])
+    lines = Lines(*strings[straight].T, t_s=t[straight] / fps_factor) if straight.sum() >= 8 else None
+    misfit = float(np.median([p.misfit for p, g in zip(r.place, good) if g])) / max(abs(follower.look.contrast), 1.0)
     view: View | None = None
 
     def _scatter(rx: np.ndarray, ry: np.ndarray) -> Factors:
@@ -243,9 +248,10 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             np.sqrt((sy * scale.y) ** 2 + vy**2 + scale.shake_px**2)[good],
             np.array(_at_first_measured(swing, t, good, fps_factor)),
             (video.width_px, video.height_px),
-            Lines(*lines.T) if len(lines) >= 8 else None,
+            lines,
             None if pivot is None else (*pivot, 1.0),
             rows_along_x=video.rotation_deg % 180 != 0,
+            off_px=max(0.02, misfit * follower.look.radius_px / 3),
         )
         if found is None:
             break
@@ -261,7 +267,6 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + sigma**2)[good])))
     motion = swing if view is None else view.swing(fps_factor)
     warnings += poor_motion(motion, t, good, rms_px, typical)
-    misfit = float(np.median([p.misfit for p, g in zip(r.place, good) if g])) / max(abs(follower.look.contrast), 1.0)
     if misfit > _POOR_PICTURE or not follower.look.even:
         warnings.append(
             said(
@@ -343,6 +348,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             "string_angle_rad": strings[:, 2],
             "string_angle_sigma_rad": strings[:, 3],
             "string_sigma_px": strings[:, 4],
+            "string_half_px": strings[:, 5],
             "log": log,
             "warnings": [*video.warnings, *warnings],
         },

@@ -30,9 +30,11 @@ def least_squares(
     *,
     turns: int = 25,
     settled: float = 1e-7,
+    slopes: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Minimum | None:
     """Minimise |rest(values)|² over values[free] from `start`; `steps` are the differences' steps, one a value.
 
+    `slopes` gives d rest / d values[free] where that is to be had more cheaply than by differences of `rest`.
     Ends after `turns` or where a step gains less than the fraction `settled`. None where numbers are not finite.
     """
     index = list(free)
@@ -45,10 +47,13 @@ def least_squares(
     jacobian = np.empty((now.size, len(index)))
     normal = np.empty((len(index), len(index)))
     for _ in range(turns):
-        for column, i in enumerate(index):
-            moved = values.copy()
-            moved[i] += steps[i]
-            jacobian[:, column] = (rest(moved) - now) / steps[i]
+        if slopes is not None:
+            jacobian = slopes(values)
+        else:
+            for column, i in enumerate(index):
+                moved = values.copy()
+                moved[i] += steps[i]
+                jacobian[:, column] = (rest(moved) - now) / steps[i]
         normal, pull = jacobian.T @ jacobian, jacobian.T @ now
         if not np.all(np.isfinite(normal)):
             return None

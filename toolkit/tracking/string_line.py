@@ -36,6 +36,16 @@ def measure_string(
     return line if line.strength > 8 and np.all(np.isfinite(out)) else None
 
 
+def seen_half(distance_px: np.ndarray, radius_px: float) -> np.ndarray:
+    """Half the length of the piece of string that was measured, from how far the line's point is from the bob's centre."""
+    return np.asarray(distance_px - _start(radius_px))
+
+
+def _start(radius_px: float) -> float:
+    """How far from the bob's centre the string is looked at first."""
+    return 1.15 * radius_px + 6.0
+
+
 @cache
 def _compiled() -> Any:
     import numba

@@ -1,0 +1,353 @@
+"""The joint second pass: motion, pivot, and what the camera did to them, as far as the clip can tell.
+
+One fit of all positions and string lines at once. Weak priors say what cameras do. Two answers come of it: the simplest view
+that explains the clip, effects being added only while one explains much of what is left (Occam), and samples of
+every view that clip and priors allow, all effects free. The first gives the angles, the second their uncertainty; no
+effect is ever taken to be exactly absent.
+
+How the period depends on amplitude is kept out of it by a free factor between the motion's angle and the picture's:
+that evidence belongs to the fit of the physics, which would else count it twice.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from toolkit.tracking.least_squares import Minimum, least_squares
+from toolkit.tracking.swing import NAMES as SWING_NAMES
+from toolkit.tracking.swing import solve_swing
+from toolkit.tracking.view import AT, GROUPS, NAMES, View
+
+_STEPS = np.array(
+    [1e-3, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-4, 1e-6, 1e-5, 1e-5, 1e-7, 1e-3, 1e-3]
+)
+# Standard deviations of what cameras do, by judgement: some 10 degrees off square, lenses that bend 5 % at the corner,
+# swings 3 degrees out of the plane, readouts of 15 ms; focal lengths of 1.2 to 3.3 picture widths (nearness = width / focal length).
+_PRIOR = {
+    "factor": (1.0, 0.3), "yaw": (0.0, 0.2), "pitch": (0.0, 0.12), "log_nearness": (-0.7, 0.5), "k1": (0.0, 0.05),
+    "sway_sin": (0.0, 0.05), "sway_cos": (0.0, 0.05), "readout": (0.0, 0.015),
+}  # fmt: skip
+_TILTS = ((0.1, 0.05), (-0.1, 0.05), (0.1, -0.05), (-0.1, -0.05))
+_SQUARE = (*SWING_NAMES, "factor")
+_BENDING = tuple(AT[name] for name in NAMES[10:])  # what bends the model: sampled; the rest follows linearly
+_MOST = 300  # positions, and a third as many lines, are enough to see what the camera did
+_CLEAR = 25.0  # by how much χ² must fall before a camera effect is believed
+_SAMPLES, _ROUNDS = 120, 5  # draws a round
+
+
+class Lines(NamedTuple):
+    """The string on some frames: a point (px), its direction (rad from the downward axis, positive to the right), the
+    uncertainties of direction and place, half the length (px) of the piece that was seen about the point, and when (s)."""
+
+    x_px: np.ndarray
+    y_px: np.ndarray
+    angle_rad: np.ndarray
+    sigma_rad: np.ndarray
+    sigma_px: np.ndarray
+    half_px: np.ndarray
+    t_s: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> Lines:
+        """Some of them, by index or mask."""
+        return Lines(*(column[chosen] for column in self))
+
+
+def fit_view(
+    t_s: np.ndarray,
+    x_px: np.ndarray,
+    y_px: np.ndarray,
+    sigma_x_px: np.ndarray,
+    sigma_y_px: np.ndarray,
+    start: np.ndarray,
+    size_px: tuple[int, int],
+    lines: Lines | None = None,
+    pivot: tuple[float, float, float] | None = None,
+    rows_along_x: bool = False,
+    off_px: float = 0.02,
+) -> View | None:
+    """Fit the joint model to positions (n,) with standard uncertainties at stamps t_s, from a swing's values (9,), whose
+    state is that at t_s[0]. `pivot` is (x, y, σ) where it is known otherwise; `off_px` is how far the places may be off the
+    bob's centre, the same on all frames. None where no pendulum motion fits.
+    """
+    n = t_s.size
+    some = np.unique(np.linspace(0, n - 1, min(n, _MOST)).astype(int))
+    values = np.concatenate([start, [1.0], np.zeros(len(NAMES) - 10)])
+    values[AT["log_nearness"]] = _PRIOR["log_nearness"][0]
+    model = View(
+        values, np.zeros(0), np.zeros(0), np.zeros(0), (), ((size_px[0] - 1) / 2, (size_px[1] - 1) / 2),
+        float(t_s[0]), 1.0, rows_along_x,
+    )  # fmt: skip
+    prior = {**_PRIOR, "off_x": (0.0, off_px), "off_y": (0.0, off_px)}
+    places = t_s[some], x_px[some], y_px[some], sigma_x_px[some], sigma_y_px[some]
+    problem = _Problem(model, *places, lines, pivot, prior)
+    square = problem.solve(values, _SQUARE, 25)
+    if square is None:
+        return None
+    problem.trim(square.values)
+    chosen = problem.solve(square.values, _SQUARE, 8) or square
+    full = problem.solve(chosen.values, NAMES, 8)
+    modes = [] if full is None else [full]
+    shown: tuple[str, ...] = ()
+    while modes and len(shown) < len(GROUPS):
+        problem.weigh(problem.inflation(modes[0].values))
+        chosen = problem.solve(chosen.values, _names(shown), 8) or chosen
+        modes = problem.modes(modes[0].values, chosen.values)
+        if not modes or chosen.chi2 - modes[0].chi2 < _CLEAR:
+            break
+        best, winner = chosen, ""
+        for group in GROUPS:
+            if group in shown:
+                continue
+            for trial in _turned(chosen.values) if group == "tilt" else [chosen.values]:
+                found = problem.solve(trial, _names((*shown, group)), 8)
+                if found is not None and found.chi2 < best.chi2:
+                    best, winner = found, group
+        if not winner or chosen.chi2 - best.chi2 < _CLEAR:
+            break
+        shown = (*shown, winner)
+        problem.trim(best.values)
+        chosen = problem.solve(best.values, _names(shown), 12) or best
+    modes = problem.modes(*(m.values for m in modes[:1]), chosen.values, *_turned(chosen.values))
+    if not modes:
+        return None
+    try:
+        covariance = _spread(chosen, _names(shown))
+        samples, weights = problem.sample(modes)
+    except np.linalg.LinAlgError:
+        return None
+    return View(
+        chosen.values, covariance, samples, weights, shown, model.middle_px, model.t0_s, problem.weaker, rows_along_x
+    )
+
+
+def _names(shown: tuple[str, ...]) -> tuple[str, ...]:
+    """The parameters that are free where these camera effects are in the model."""
+    more = [name for group in shown for name in GROUPS[group]]
+    if "tilt" in shown or "sway" in shown:
+        more.append("log_nearness")
+    return tuple(name for name in NAMES if name in _SQUARE or name in more)
+
+
+def _turned(values: np.ndarray) -> list[np.ndarray]:
+    """The same seen from four sides: mirrored views are minima of their own."""
+    turned = []
+    for tilt in _TILTS:
+        turned.append(values.copy())
+        turned[-1][[AT["yaw"], AT["pitch"]]] = tilt
+    return turned
+
+
+def _spread(least: Minimum, names: tuple[str, ...]) -> np.ndarray:
+    """Covariance of all parameters, zero where held."""
+    index = [AT[name] for name in names]
+    whole = np.zeros((len(NAMES), len(NAMES)))
+    whole[np.ix_(index, index)] = np.linalg.inv(least.normal)
+    return whole
+
+
+class _Problem:
+    """The residuals of a clip."""
+
+    def __init__(
+        self,
+        model: View,
+        t_s: np.ndarray,
+        x: np.ndarray,
+        y: np.ndarray,
+        sx: np.ndarray,
+        sy: np.ndarray,
+        lines: Lines | None,
+        pivot: tuple[float, float, float] | None,
+        prior: dict[str, tuple[float, float]],
+    ) -> None:
+        self.model, self.t, self.x, self.y = model, t_s - model.t0_s, x, y
+        self.wx, self.wy = 1 / sx, 1 / sy
+        self.rows = model.rows(x, y)
+        self.weaker = 1.0  # by what all data are, as their residuals are larger or less independent than their σ says
+        if lines is not None and lines.x_px.size > _MOST // 3:
+            lines = lines.of(np.unique(np.linspace(0, lines.x_px.size - 1, _MOST // 3).astype(int)))
+        self.lines, self.pivot = lines, pivot
+        self.line_weight = np.zeros(0) if lines is None else np.ones(lines.x_px.size)
+        self.tied = np.array([AT[name] for name in prior])
+        self.centre, self.width = np.array(list(prior.values())).T
+        self.steps = _STEPS.copy()
+        self.steps[4] *= abs(model.values[4])
+        if lines is not None:
+            # a straight line fitted to a bent string crosses it in the two Gauss points
+            reach = np.maximum(np.nan_to_num(lines.half_px, nan=1.0), 1.0) / np.sqrt(3)
+            dx, dy = reach * np.sin(lines.angle_rad), reach * np.cos(lines.angle_rad)
+            self.crossed = lines.x_px - dx, lines.y_px - dy, lines.x_px + dx, lines.y_px + dy
+            above, below = model.rows(*self.crossed[:2]), model.rows(*self.crossed[2:])
+            self.later = np.where(np.isfinite(lines.t_s), below - above, 0.0)
+            self.line_t = np.nan_to_num(lines.t_s - model.t0_s)
+
+    def rest(self, v: np.ndarray) -> np.ndarray:
+        """Positions (x then y), lines, priors, over their standard uncertainties: (…, r) for v (19,) or (19, k, 1)."""
+        stacked = v.reshape(len(NAMES), -1)
+        angle = np.array([solve_swing(s, self.t + s[16] * self.rows)[0] for s in stacked.T])
+        return self._rest(v, angle[0] if v.ndim == 1 else angle)
+
+    def _rest(self, v: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        sway = self.model.sway(v, self.t + v[16] * self.rows)
+        x, y = self.model.see(v, v[9] * angle, sway)
+        parts = [(x - self.x) * (self.wx / self.weaker), (y - self.y) * (self.wy / self.weaker)]
+        if self.lines is not None:
+            parts.append(self.line_rest(v) * (self.line_weight / self.weaker))
+        v = v if v.ndim == 1 else v[..., 0].T
+        parts.append((v[..., self.tied] - self.centre) / self.width)
+        if self.pivot is not None:
+            parts.append((v[..., :2] - self.pivot[:2]) / self.pivot[2])
+        return np.concatenate(parts, axis=-1)
+
+    def slopes(self, v: np.ndarray, index: list[int]) -> np.ndarray:
+        """d rest / d v[index], (r, len(index)): the motion is solved anew only for what moves it."""
+        v0 = v[:, None, None]
+        angle = solve_swing(v, self.t + v[16] * self.rows)[0]
+        moved = v0 + np.eye(len(NAMES))[:, index][..., None] * self.steps[:, None, None]
+        angles = np.tile(angle, (len(index), 1))
+        for row, i in enumerate(index):
+            if 4 <= i <= 8 or i == 16:
+                w = moved[:, row, 0]
+                angles[row] = solve_swing(w, self.t + w[16] * self.rows)[0]
+        return ((self._rest(moved, angles) - self._rest(v, angle)) / self.steps[index][:, None]).T
+
+    def line_rest(self, v: np.ndarray) -> np.ndarray:
+        """How far each line passes the pivot, over its uncertainty there."""
+        assert self.lines is not None
+        k = self.lines
+        ax, ay, bx, by = self.crossed
+        ax, ay = self.model.straight(v, ax, ay)
+        bx, by = self.model.straight(v, bx, by)
+        if np.any(v[16]) and np.any(self.later):  # the lower point is seen later: turned back to when the upper one was
+            first = v if v.ndim == 1 else v[:, 0, 0]
+            turn = v[9] * solve_swing(first, self.line_t)[1] * v[16] * self.later
+            dx, dy = bx - v[0], by - v[1]
+            bx, by = v[0] + dx - turn * dy, v[1] + dy + turn * dx
+        dx, dy = bx - ax, by - ay
+        size = np.hypot(dx, dy)
+        away = (dy * (v[0] - ax) - dx * (v[1] - ay)) / size
+        reach = np.hypot(v[0] - 0.5 * (ax + bx), v[1] - 0.5 * (ay + by))
+        return np.asarray(away / np.hypot(np.hypot(k.sigma_rad * reach, k.sigma_px), 1e-3))
+
+    def weigh(self, inflation: float) -> None:
+        """Let all data weigh as their residuals say."""
+        self.weaker = inflation
+
+    def solve(self, start: np.ndarray, names: tuple[str, ...], turns: int) -> Minimum | None:
+        values = start.copy()
+        for name in NAMES[10:]:
+            if name not in names and name != "log_nearness":
+                values[AT[name]] = 0.0
+        index = [AT[n] for n in names]
+        return least_squares(
+            self.rest, values, self.steps, index, turns=turns, settled=1e-5, slopes=lambda v: self.slopes(v, index)
+        )
+
+    def modes(self, *starts: np.ndarray) -> list[Minimum]:
+        """The minima with every effect free to which these starts lead, the deepest first."""
+        found = [m for m in (self.solve(s, NAMES, 10) for s in starts) if m is not None]
+        apart: list[Minimum] = []
+        for mode in sorted(found, key=lambda m: m.chi2):
+            near = any((mode.values - m.values) @ m.normal @ (mode.values - m.values) < 4.0 for m in apart)
+            if not apart or (not near and mode.chi2 < apart[0].chi2 + 30):
+                apart.append(mode)
+        return apart
+
+    def trim(self, values: np.ndarray) -> None:
+        """Leave out strays, and let the lines weigh as they scatter."""
+        n = self.t.size
+        left = self.rest(values) * self.weaker
+        size = np.hypot(left[:n], left[n : 2 * n])
+        off = size > max(8.0, 6 * float(np.median(size)))
+        if 0 < off.sum() < 0.1 * off.size:
+            self.wx, self.wy = np.where(off, 0.0, self.wx), np.where(off, 0.0, self.wy)
+        if self.lines is not None:
+            rest = self.line_rest(values)
+            spread = max(1.0, 1.4826 * float(np.median(np.abs(rest))))
+            self.line_weight = np.where(np.abs(rest) < 4 * spread, 1 / spread, 0.0)
+
+    def inflation(self, values: np.ndarray) -> float:
+        """How far the residuals exceed their σ, with their correlation from frame to frame.
+
+        At least as if half of σ were no scatter but a bent error that returns with the place (a shadow's, a shading's),
+        such as a handful of points along the arc would have.
+        """
+        n = self.t.size
+        left = self.rest(values) * self.weaker
+        block = max(2, min(20, n // 12))
+        whole = n // block * block
+        found = 1.0 + 0.25 * n / 5
+        for r in (left[:n], left[n : 2 * n]):
+            sums = r[:whole].reshape(-1, block).sum(axis=1)
+            found = max(found, float(np.mean(r**2)), float(np.mean(sums**2)) / block)
+        return float(np.sqrt(found))
+
+    @np.errstate(all="ignore")  # a draw too far is told by its weight
+    def sample(self, modes: list[Minimum]) -> tuple[np.ndarray, np.ndarray]:
+        """Views (m, 19) with weights (m,) that stand for all that data and priors allow.
+
+        Adaptive importance sampling: what bends the model is drawn from heavy-tailed bells, first about the minima, then
+        about what the draws so far have found; what follows nearly linearly (pivot, length, motion) is put to its best for
+        each draw, and scattered about it at the end.
+        """
+        rng = np.random.default_rng(0)
+        bent = list(_BENDING)
+        follows = [i for i in range(len(NAMES)) if i not in bent]
+        values = modes[0].values
+        jacobian = self.slopes(values, list(range(len(NAMES))))
+        pull = -np.linalg.pinv(jacobian[:, follows])
+        tied = pull @ jacobian[:, bent]
+        bells = [_Bell(m.values[bent], np.linalg.inv(m.normal)[np.ix_(bent, bent)]) for m in modes]
+        starts = [m.values for m in modes]
+        draws, target, counts = np.zeros((0, len(NAMES))), np.zeros(0), []
+        for turn in range(_ROUNDS):
+            new = range(len(bells)) if turn == 0 else range(len(bells) - 1, len(bells))
+            for k in new:
+                count = _SAMPLES // len(new)
+                v = np.tile(starts[min(k, len(starts) - 1)], (count, 1))
+                v[:, bent] = bells[k].draw(rng, count)
+                v[:, follows] += (v[:, bent] - starts[min(k, len(starts) - 1)][bent]) @ tied.T
+                for _ in range(2):
+                    v[:, follows] += self.rest(v.T[..., None]) @ pull.T
+                left = self.rest(v.T[..., None])
+                draws = np.concatenate([draws, v])
+                target = np.concatenate([target, -0.5 * np.sum(left**2, axis=1)])
+                counts.append(count)
+            target = np.where(np.isfinite(target), target, -np.inf)
+            shares = np.log(np.array(counts)[:, None]) + np.array([b.log_density(draws[:, bent]) for b in bells])
+            log_weight = target - np.logaddexp.reduce(shares, axis=0)
+            weight = np.exp(log_weight - log_weight.max())
+            soft = weight
+            while 1 / np.sum((soft / soft.sum()) ** 2) < 3 * len(bent):  # too few count: those near count too
+                soft = np.sqrt(soft)
+            soft = soft / soft.sum()
+            middle = soft @ draws
+            off = (draws - middle)[:, bent]
+            spread = (off * soft[:, None]).T @ off
+            bells.append(_Bell(middle[bent], spread))
+            starts.append(middle)
+        weight /= weight.sum()
+        keep = weight > 1e-4
+        v, weight = draws[keep], weight[keep] / weight[keep].sum()
+        normal = modes[0].normal[np.ix_(follows, follows)]
+        v[:, follows] += rng.multivariate_normal(np.zeros(len(follows)), np.linalg.inv(normal), len(v))
+        return v, weight
+
+
+class _Bell:
+    """Student's t of 5 degrees of freedom about `middle` (k,) with the covariance's shape (k, k)."""
+
+    def __init__(self, middle: np.ndarray, covariance: np.ndarray) -> None:
+        self.middle = middle
+        self.root = np.linalg.cholesky(covariance + 1e-9 * np.diag(np.diag(covariance)))
+        self.unroot = np.linalg.inv(self.root)
+
+    def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        heavy = np.sqrt(5 / rng.chisquare(5, count))[:, None]
+        return np.asarray(self.middle + heavy * rng.normal(size=(count, self.middle.size)) @ self.root.T)
+
+    def log_density(self, places: np.ndarray) -> np.ndarray:
+        size = np.sum(((places - self.middle) @ self.unroot.T) ** 2, axis=1)
+        return np.asarray(-0.5 * (5 + self.middle.size) * np.log1p(size / 5) - np.sum(np.log(np.diag(self.root))))
