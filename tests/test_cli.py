@@ -281,9 +281,11 @@ def test_batch_makes_one_report_a_recording_and_goes_on_past_a_bad_one(tmp_path)
 
 def test_version_and_bare_command():
     version = pendulab("--version")
-    assert version.returncode == 0 and re.fullmatch(r"pendulab \d+\.\d+\S*\n", version.stdout), version
+    assert version.returncode == 0
+    assert re.fullmatch(r"pendulab \d+\.\d+\S*\n", version.stdout)
     bare = pendulab()
-    assert bare.returncode == 0 and bare.stdout == pendulab("--help").stdout
+    assert bare.returncode == 0
+    assert bare.stdout == pendulab("--help").stdout
 
 
 def test_help_of_every_command():
