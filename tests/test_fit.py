@@ -19,6 +19,7 @@ from toolkit.fitting.solve import _verdict
 from toolkit.models import STANDARD
 from toolkit.scene import Environment, Pendulum, Scene
 from toolkit.series import ThetaSeries
+from toolkit.simulate import simulate
 
 OMEGA = math.sqrt(9.80665 / 0.5)
 
@@ -408,3 +409,21 @@ def test_a_stuck_fit_is_said():
     assert not done
     assert message.key == "fit.unsettled"
     assert "start value" in message
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"moving_pivot": {"amplitude_m": 0.004, "f_hz": 1.3, "phase_rad": 0.4}},
+        {"formula": {"torque": "0.02*cos(5*t)"}},
+    ],
+)
+def test_what_a_scene_says_of_time_holds_for_a_record_that_starts_late(effects):
+    begin = 37.3
+    scene = Scene(
+        pendulum=Pendulum(mass_kg=0.1, length_m=0.5), effects={"linear_drag": {"k_d_kg_per_s": 0.004}, **effects}
+    )
+    whole = simulate(scene, np.linspace(0, begin + 12, 6000), 1e-9)
+    late = whole.t_s >= begin
+    series = ThetaSeries(whole.t_s[late], whole.theta_rad[late], np.full(int(late.sum()), 1e-5))
+    assert fit(series, scene, "scene").chi2 < 1e-2 * late.sum()  # noise-free: what is left is the solver's error

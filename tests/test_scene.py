@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from toolkit import JobError, Scene, UsageError
-from toolkit.scene import normal_gravity
+from toolkit.scene import Camera, normal_gravity
 
 SCENE = """
 [pendulum]
@@ -72,7 +72,7 @@ def test_gravity_defaults_to_the_standard_value():
         ({"effects": 1}, ["effects"]),
         ({"camera": {"pivot_px": [1]}}, ["pivot_px"]),
         ({"camera": {"width_px": 64.5}}, ["width_px", "64.5"]),
-        ({"camera": {"motion_blurr": {}}}, ["motion_blurr", "motion_blur"]),
+        ({"camera": {"perspectiv": {}}}, ["motion_blurr", "motion_blur"]),
         ({"environment": {"g_m_per_s2": 9.8, "latitude_deg": 10}}, ["g_m_per_s2", "latitude_deg"]),
         ({"approximations": {"small_angle": "yes"}}, ["small_angle", "yes"]),
     ],
@@ -96,3 +96,14 @@ def test_unreadable_files(tmp_path):
     binary.write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(UsageError, match="UTF-8"):
         Scene.from_toml(binary)
+
+
+def test_a_scene_made_in_python_is_checked_like_a_file():
+    scene = Scene(effects={"moving_pivot": {"amplitude_m": 0.01, "f_hz": 2.0}})
+    assert scene.effects["moving_pivot"]["phase_rad"] == 0.0
+    with pytest.raises(UsageError, match="linear_drag"):
+        Scene(effects={"linear_darg": {}})
+    with pytest.raises(UsageError, match="k_d_kg_per_s"):
+        Scene(effects={"linear_drag": {"k_d": 0.1}})
+    with pytest.raises(UsageError, match="perspective"):
+        Camera(effects={"perspectiv": {}})

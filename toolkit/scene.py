@@ -86,6 +86,11 @@ class Camera:
 
     def __post_init__(self) -> None:
         _require_positive("camera", self, "width_px", "height_px", "fps", "duration_s", "px_per_m")
+        if self.effects:
+            from toolkit import camera
+
+            checked = {name: camera.check_parameters(name, values) for name, values in self.effects.items()}
+            object.__setattr__(self, "effects", checked)
 
 
 @dataclass(frozen=True)
@@ -93,7 +98,7 @@ class Scene:
     """All that is known or assumed about one pendulum experiment. See `from_toml` for its file form.
 
     `effects` maps an effect's name to its parameters (`{"linear_drag": {"k_d_kg_per_s": 0.16}}`); an effect that
-    is not named does not act.
+    is not named does not act. Raises UsageError for an effect or a parameter that there is not, or that is out of range.
     """
 
     pendulum: Pendulum = field(default_factory=Pendulum)
@@ -102,6 +107,9 @@ class Scene:
     effects: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     approximations: Approximations = field(default_factory=Approximations)
     camera: Camera | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", _checked_effects(self.effects))
 
     def with_(self, **sections: Any) -> Scene:
         """A copy with whole sections replaced."""
@@ -143,7 +151,7 @@ class Scene:
             if name not in kinds:
                 raise UsageError(f"unknown section [{name}]{did_you_mean(name, known)}")
         parts: dict[str, Any] = {name: _read_section(kinds[name], section, name) for name, section in sections.items()}
-        return cls(**parts, effects=_read_effects(effects), camera=None if camera is None else _read_camera(camera))
+        return cls(**parts, effects=effects, camera=None if camera is None else _read_camera(camera))
 
     def to_dict(self) -> dict[str, Any]:
         """Nested dicts of what is set (no None), as `from_dict` reads them."""
@@ -212,24 +220,22 @@ def checked_number(value: Any, what: str) -> float:
     return float(value)
 
 
-def _read_effects(table: Any) -> dict[str, dict[str, Any]]:
-    from toolkit import effects
-
+def _checked_effects(table: Any) -> dict[str, dict[str, Any]]:
     if not isinstance(table, Mapping):
         raise UsageError(f"[effects] must hold one table an effect, got {table!r}")
+    if not table:
+        return {}
+    from toolkit import effects
+
     return {name: effects.check_parameters(name, values) for name, values in table.items()}
 
 
 def _read_camera(table: Any) -> Camera:
-    from toolkit import camera
-
     if not isinstance(table, Mapping):
         raise UsageError(f"[camera] must be a table of keys, got {table!r}")
     keys = {k: v for k, v in table.items() if not isinstance(v, Mapping)}
-    used = {
-        name: camera.check_parameters(name, values) for name, values in table.items() if isinstance(values, Mapping)
-    }
-    return replace(_read_section(Camera, keys, "camera"), effects=used)
+    effects = {name: values for name, values in table.items() if isinstance(values, Mapping)}
+    return replace(_read_section(Camera, keys, "camera"), effects=effects)
 
 
 def _require_positive(where: str, section: Any, *names: str) -> None:

@@ -198,7 +198,7 @@ class Problem:
             series = replace(series, theta_rad=series.theta_rad + change)
         else:
             raise UsageError(f"no input {name!r} here")
-        model = load_model(self.model.name).within(scene)
+        model = load_model(self.model.name).within(scene, self.shift_s)
         return replace(self, scene=scene, series=series, values=values, model=model)
 
     def normal_inverse(self, result: FitResult) -> np.ndarray:
@@ -251,7 +251,9 @@ def pose(
     """What `fit` solves. See there for the arguments and errors."""
     if loss not in _LOSSES:
         raise UsageError(f"unknown loss {loss!r}{did_you_mean(loss, _LOSSES)}")
-    within = load_model(model).within(scene)
+    first = float(series.t_s[0])
+    shift = first if first < 0 or first > series.duration_s else 0.0
+    within = load_model(model).within(scene, shift)
     mass, length = scene.pendulum.mass_kg, scene.pendulum.length_m
     both = mass is not None and length is not None
     reported = {
@@ -305,8 +307,6 @@ def pose(
         values[name] = float(value)
         names = [n for n in names if n != name]
         known.pop(name, None)
-    first = float(series.t_s[0])
-    shift = first if first < 0 or first > series.duration_s else 0.0
     sigma = series.sigma_theta_rad
     return Problem(
         series=series,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -106,22 +107,23 @@ class Model:
         """The equation of motion that is solved."""
         return str(self._equation().latex)
 
-    def within(self, scene: Scene) -> Model:
+    def within(self, scene: Scene, shift_s: float = 0.0) -> Model:
         """This model in a scene: driven where the scene is, in the scene's own units where the equation needs them.
 
+        shift_s : the scene's time at which the motion's own begins: held phases and formulas of t are moved by it.
         Raises UsageError where the scene lacks a number that the equation needs.
         """
         effects, small_angle, formula = self.effects, self.small_angle, self.formula
         if self.from_scene:
             effects = tuple(name for name in scene.effects if name != "slack_string")  # which only watches the tension
             small_angle = scene.approximations.small_angle
-            formula = str(scene.effects.get("formula", {}).get("torque", ""))
+            formula = re.sub(r"\bt\b", f"(t + {shift_s!r})" if shift_s else "t", _torque(scene))
         if "cosine_drive" in scene.effects and "cosine_drive" not in effects:
             effects = (*effects, "cosine_drive")
         model = replace(self, effects=effects, small_angle=small_angle, formula=formula)
-        return replace(model, fixed=model._constants(scene)) if model.needs_scene else model
+        return replace(model, fixed=model._constants(scene, shift_s)) if model.needs_scene else model
 
-    def _constants(self, scene: Scene) -> dict[str, float]:
+    def _constants(self, scene: Scene, shift_s: float) -> dict[str, float]:
         from toolkit.effects import check_parameters
 
         pendulum, air = scene.pendulum, scene.environment
@@ -138,6 +140,8 @@ class Model:
         for effect in self.effects:
             if effect not in REDUCED:
                 table = check_parameters(effect, scene.effects.get(effect, {}))
+                if "phase_rad" in table:
+                    table["phase_rad"] += 2 * math.pi * table["f_hz"] * shift_s
                 constants |= {
                     f"{effect}.{key}": value for key, value in table.items() if isinstance(value, int | float)
                 }
@@ -301,6 +305,10 @@ def _combined(chain: Sequence[Mapping[str, float]], columns: Mapping[str, np.nda
         for column, weight in parts.items():
             row += weight * columns[column]
     return out.T
+
+
+def _torque(scene: Scene) -> str:
+    return str(scene.effects.get("formula", {}).get("torque", ""))
 
 
 @functools.lru_cache(maxsize=32)
