@@ -72,7 +72,7 @@ def test_gravity_defaults_to_the_standard_value():
         ({"effects": 1}, ["effects"]),
         ({"camera": {"pivot_px": [1]}}, ["pivot_px"]),
         ({"camera": {"width_px": 64.5}}, ["width_px", "64.5"]),
-        ({"camera": {"perspectiv": {}}}, ["motion_blurr", "motion_blur"]),
+        ({"camera": {"motion_blurr": {}}}, ["motion_blurr", "motion_blur"]),
         ({"environment": {"g_m_per_s2": 9.8, "latitude_deg": 10}}, ["g_m_per_s2", "latitude_deg"]),
         ({"approximations": {"small_angle": "yes"}}, ["small_angle", "yes"]),
     ],
