@@ -215,7 +215,9 @@ def _view(
             return None
     direction = np.unwrap(np.arctan2(x - known.pivot_px[0], y - known.pivot_px[1]))
     off = known["vertical"] - 0.5 * (direction.max() + direction.min())
-    driven = not known.shown and abs(off) > 0.3 * float(np.ptp(direction))
+    mx, my = known.position(t, x, y)
+    strays = np.hypot(x - mx, y - my) > np.maximum(0.1, 3 * np.hypot(sx, sy))  # else one side was hidden, no more
+    driven = not known.shown and abs(off) > 0.3 * float(np.ptp(direction)) and strays.mean() > 0.3
     return None if driven else known
 
 
@@ -316,7 +318,7 @@ def _lines(track: Track, kept: np.ndarray) -> Lines | None:
     if track.meta.get("string_angle_rad") is None:
         return None
     names = ("x_px", "y_px", "angle_rad", "angle_sigma_rad", "sigma_px", "half_px")
-    lines = Lines(*(np.asarray(track.meta[f"string_{n}"])[kept] for n in names), t_s=track.t_s[kept])
+    lines = Lines(*[*(np.asarray(track.meta[f"string_{n}"])[kept] for n in names), track.t_s[kept]])
     good = np.isfinite(lines.angle_rad)
     return lines.of(good) if good.sum() >= 8 else None
 

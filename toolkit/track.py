@@ -228,7 +228,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         strings[k, :5] = line
     strings[:, 5] = seen_half(np.hypot(strings[:, 0] - x, strings[:, 1] - y), follower.look.radius_px)
     straight = good & np.isfinite(strings[:, 5])
-    lines = Lines(*strings[straight].T, t_s=t[straight] / fps_factor) if straight.sum() >= 8 else None
+    lines = Lines(*[*strings[straight].T, t[straight] / fps_factor]) if straight.sum() >= 8 else None
     misfit = float(np.median([p.misfit for p, g in zip(r.place, good) if g])) / max(abs(follower.look.contrast), 1.0)
     view: View | None = None
 
@@ -264,7 +264,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     sx, sy = sx * scale.x, sy * scale.y
     rms_px = float(np.sqrt(0.5 * np.mean((x - mx)[good] ** 2 + (y - my)[good] ** 2)))
     late = time_sigma * np.hypot(*swing.velocity(t))
-    typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + sigma**2)[good])))
+    typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + shift.sigma**2)[good])))
     motion = swing if view is None else view.swing(fps_factor)
     warnings += poor_motion(motion, t, good, rms_px, typical)
     if misfit > _POOR_PICTURE or not follower.look.even:

@@ -9,6 +9,8 @@ from toolkit.tracking.follow import Record
 from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Video
 
+_PLACED = 0.01  # of the swing's extent: how far places may still stray where lost frames are placed
+
 
 def even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:
     """Time stamps that a file keeps only to the millisecond (Matroska, WebM), put back on their even grid.
@@ -107,7 +109,7 @@ def place_lost_frames(
     believed where a picture repeats the one before (`repeated`, (n,) bool), else only told.
     """
     step = float(np.median(np.diff(t)))
-    first, placed, odd = t.copy(), 0, 0
+    first, given, placed, odd = t.copy(), swing, 0, 0
     when: list[float] = []
     for _ in range(6):
         mx, my = swing.position(t)
@@ -127,6 +129,8 @@ def place_lost_frames(
         t, swing = moved, better
         placed += len(lost)
         when += [float(first[k]) for k, _ in lost]
+    if placed and swing.rms_px > _PLACED * np.hypot(np.ptp(x[good]), np.ptp(y[good])):
+        t, swing, placed, odd = first, given, 0, odd + placed  # too much is amiss to know what was lost where
     if placed:
         warnings.append(
             said(

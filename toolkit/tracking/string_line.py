@@ -1,7 +1,8 @@
 """The string as a straight line: its direction in one frame, to a few thousandths of a degree.
 
-Least squares of a ridge of Gaussian profile to cross-sections between the bob and the pivot, each on its own level
-(the mean of its ends), first on the piece near the bob, then on the whole length.
+The direction that stands out most among those some 15 degrees to either side of the pivot's (which may not be known
+well yet) is refined by least squares: a ridge of Gaussian profile, each cross-section on its own level (the mean of its
+ends), first on the piece near the bob, then on the whole length.
 """
 
 from __future__ import annotations
@@ -66,6 +67,38 @@ def _compiled() -> Any:
         for j in range(11):
             ridge_of[j] = np.exp(-((j - 5.0) ** 2) / (2 * width2))
         profile = np.empty(17)
+        # strips across, and how much darker or brighter than both its sides the line at each slope from the bob is
+        strips = np.empty((24, 65))
+        far = min(start + 60.0, length - 4.0)
+        for k in range(24):
+            along = start + (k + 0.5) * (far - start) / 24
+            for j in range(65):
+                x, y = bx + ux * along - uy * (j - 32.0), by + uy * along + ux * (j - 32.0)
+                ix, iy = int(x), int(y)
+                strips[k, j] = np.nan
+                if x >= 0.0 and y >= 0.0 and ix < columns - 1 and iy < rows - 1:
+                    fx, fy = x - ix, y - iy
+                    top = luma[iy, ix] * (1 - fx) + luma[iy, ix + 1] * fx
+                    bottom = luma[iy + 1, ix] * (1 - fx) + luma[iy + 1, ix + 1] * fx
+                    strips[k, j] = top * (1 - fy) + bottom * fy
+        plain, best, slope_of = 0.0, 0.0, 0.0
+        for i in range(-26, 27):
+            sum1 = sum2 = 0.0
+            seen = 0
+            for k in range(24):
+                j = int(np.round(i * (start + (k + 0.5) * (far - start) / 24) / far)) + 32
+                g = strips[k, j] - 0.5 * (strips[k, j - 5] + strips[k, j + 5])
+                if not np.isnan(g):
+                    sum1 += g
+                    sum2 += g * g
+                    seen += 1
+            if seen >= 12:
+                clear = abs(sum1) / np.sqrt(seen * (sum2 - sum1 * sum1 / seen) + 4.0 * seen * seen)
+                if abs(i) <= 4:
+                    plain = max(plain, clear)
+                if clear > best:
+                    best, slope_of = clear, i / far
+        first = slope_of if best > 1.5 * plain else 0.0
         for stage in range(3):
             end = length - 4.0
             if stage == 0:
@@ -76,7 +109,10 @@ def _compiled() -> Any:
             if end - start < 15.0:
                 return False
             # a was the place at the former middle: carry it along
-            a0 = a + b * (middle - out[5]) if stage > 0 else 0.0
+            if stage == 0:
+                b = first
+                out[5] = 0.0
+            a0 = a + b * (middle - out[5])
             out[5] = middle
             a = a0
             sections = int(min(100.0, end - start))

@@ -32,9 +32,9 @@ _PRIOR = {
 _TILTS = ((0.1, 0.05), (-0.1, 0.05), (0.1, -0.05), (-0.1, -0.05))
 _SQUARE = (*SWING_NAMES, "factor")
 _BENDING = tuple(AT[name] for name in NAMES[10:])  # what bends the model: sampled; the rest follows linearly
-_MOST = 300  # positions, and a third as many lines, are enough to see what the camera did
+_MOST = 160  # positions, and half as many lines, are enough to see what the camera did
 _CLEAR = 25.0  # by how much χ² must fall before a camera effect is believed
-_SAMPLES, _ROUNDS = 120, 5  # draws a round
+_SAMPLES, _ROUNDS, _ENOUGH = 100, 10, 50  # draws a round; so many independent ones are wanted
 
 
 class Lines(NamedTuple):
@@ -166,8 +166,8 @@ class _Problem:
         self.wx, self.wy = 1 / sx, 1 / sy
         self.rows = model.rows(x, y)
         self.weaker = 1.0  # by what all data are, as their residuals are larger or less independent than their σ says
-        if lines is not None and lines.x_px.size > _MOST // 3:
-            lines = lines.of(np.unique(np.linspace(0, lines.x_px.size - 1, _MOST // 3).astype(int)))
+        if lines is not None and lines.x_px.size > _MOST // 2:
+            lines = lines.of(np.unique(np.linspace(0, lines.x_px.size - 1, _MOST // 2).astype(int)))
         self.lines, self.pivot = lines, pivot
         self.line_weight = np.zeros(0) if lines is None else np.ones(lines.x_px.size)
         self.tied = np.array([AT[name] for name in prior])
@@ -264,9 +264,15 @@ class _Problem:
         if 0 < off.sum() < 0.1 * off.size:
             self.wx, self.wy = np.where(off, 0.0, self.wx), np.where(off, 0.0, self.wy)
         if self.lines is not None:
-            rest = self.line_rest(values)
-            spread = max(1.0, 1.4826 * float(np.median(np.abs(rest))))
-            self.line_weight = np.where(np.abs(rest) < 4 * spread, 1 / spread, 0.0)
+            # about the point where they meet themselves, or an arc that something else bends would outvote them
+            own = values.copy()
+            for _ in range(6):
+                rest = self.line_rest(own)
+                spread = max(1.0, 1.4826 * float(np.median(np.abs(rest))))
+                self.line_weight = np.where(np.abs(rest) < 4 * spread, 1 / spread, 0.0)
+                moved = own[:, None, None] + 0.01 * np.eye(len(NAMES))[:, :2, None]
+                slopes = ((self.line_rest(moved) - rest) * self.line_weight / 0.01).T
+                own[:2] -= np.linalg.lstsq(slopes, rest * self.line_weight, rcond=1e-6)[0]
 
     def inflation(self, values: np.ndarray) -> float:
         """How far the residuals exceed their σ, with their correlation from frame to frame.
@@ -319,6 +325,8 @@ class _Problem:
             shares = np.log(np.array(counts)[:, None]) + np.array([b.log_density(draws[:, bent]) for b in bells])
             log_weight = target - np.logaddexp.reduce(shares, axis=0)
             weight = np.exp(log_weight - log_weight.max())
+            if turn and 1 / np.sum((weight / weight.sum()) ** 2) > _ENOUGH:
+                break
             soft = weight
             while 1 / np.sum((soft / soft.sum()) ** 2) < 3 * len(bent):  # too few count: those near count too
                 soft = np.sqrt(soft)
