@@ -427,3 +427,19 @@ def test_what_a_scene_says_of_time_holds_for_a_record_that_starts_late(effects):
     late = whole.t_s >= begin
     series = ThetaSeries(whole.t_s[late], whole.theta_rad[late], np.full(int(late.sum()), 1e-5))
     assert fit(series, scene, "scene").chi2 < 1e-2 * late.sum()  # noise-free: what is left is the solver's error
+
+
+def test_a_prior_that_the_record_contradicts_is_said():
+    scene = Scene(pendulum=Pendulum(length_m=0.52))
+    result = fit(swing(omega_g=OMEGA), scene, free=("length",), priors={"length": 1e-3})
+    (said,) = [w for w in result.warnings if w.key == "fit.prior_left"]
+    assert said.values["name"] == "length"
+    assert 15 < said.values["sigmas"] < 25  # 0.52 m against 0.50 m
+
+
+def test_an_equation_that_no_start_solves_is_a_result():
+    """The torque is infinite wherever the bob can be."""
+    scene = Scene(pendulum=Pendulum(0.1, 0.5), effects={"formula": {"torque": "1/(theta - theta)"}})
+    result = fit(swing(omega_g=OMEGA), scene, "scene")
+    assert not result.success
+    assert result.message.key == "fit.unsolvable"

@@ -68,3 +68,10 @@ def test_csv_round_trip_keeps_every_bit(tmp_path_factory, rows):
     again = ThetaSeries.from_csv(path)
     for name in ("t_s", "theta_rad", "sigma_theta_rad"):
         np.testing.assert_array_equal(getattr(again, name), getattr(series, name))
+
+
+@pytest.mark.parametrize("column", ["t_s", "theta_rad"])
+def test_absurd_numbers_are_refused_before_anything_is_computed(column):
+    good = {"t_s": np.arange(3.0), "theta_rad": np.zeros(3)}
+    with pytest.raises(UsageError, match=rf"{column} reaches 1e\+300"):
+        ThetaSeries(**{**good, column: good[column] + np.array([0, 0, 1e300])})

@@ -11,6 +11,9 @@ import numpy as np
 
 from toolkit.errors import UsageError
 
+_LARGEST = {"t_s": 1e15, "theta_rad": 1e5, "sigma_theta_rad": 1e15}
+"""Beyond these a column is not what it says it is."""
+
 
 @dataclass(frozen=True)
 class ThetaSeries:
@@ -25,7 +28,7 @@ class ThetaSeries:
         `angle_scale_relative_u` (relative standard uncertainty common to all angles), `vertical_sigma_rad`,
         `length_m`, `exposure_s`, `calibration` (the content of calibration.json).
 
-    Raises UsageError where shapes differ, a value is not finite, times do not increase or a σ is not positive.
+    Raises UsageError where shapes differ, a value is not finite or absurd, times do not increase or a σ is not positive.
     """
 
     t_s: np.ndarray
@@ -48,6 +51,8 @@ class ThetaSeries:
                 raise UsageError(
                     f"{name} holds {np.sum(~np.isfinite(column))} values that are not finite; leave those rows out"
                 )
+            if (size := float(np.abs(column).max(initial=0.0))) > _LARGEST[name]:
+                raise UsageError(f"{name} reaches {size:.3g}, which no pendulum's does; check the column and its unit")
             column.setflags(write=False)
             columns[name] = column
         if columns["t_s"].size == 0:
