@@ -130,29 +130,31 @@ def test_what_is_drawn_on_the_bob_does_not_count_where_it_is_not_even():
     assert errors[1] < 0.002 < errors[0]
 
 
-@pytest.mark.parametrize("streak", [(0.0, 0.0), (6.0, 2.0)])
-def test_cover_is_the_mean_of_discs_along_the_streak(streak):
-    """What the kernel says is covered, and how that grows with the radius, against an average over many instants."""
-    from scipy.special import erf
-
-    from toolkit.trackers._disc_kernel import H_PER_SIGMA, cover
+@pytest.mark.parametrize("streak", [(0.0, 0.0), (6.0, 2.0), (11.0, -4.0)])
+def test_the_disc_model_is_the_mean_of_discs_along_the_streak(streak):
+    """Without noise, the fit of a disc averaged over many instants leaves next to nothing, and finds its radius and edge."""
+    from toolkit.trackers.disc import fit_disc
 
     sigma = 0.9
-    y, x = (a.ravel().astype(float) for a in np.mgrid[:56, :56])
-    lists = [np.zeros(x.size) for _ in range(7)]
-    share, rise = lists[:2]
-    cover(x, y, np.array([28.3, 27.6, RADIUS, sigma * H_PER_SIGMA]), np.array(streak), *lists)
+    instants = (np.arange(200) + 0.5) / 200 - 0.5
+    image = np.mean([blurred_disc(28.3 + u * streak[0], 27.6 + u * streak[1], sigma) for u in instants], axis=0)
+    look = Look(RADIUS * 1.03, sigma * 1.1, BOB - WALL, 0.1)
+    out = fit_disc(patch_of(image), look, Guess(328.4, 527.4, *streak), calibrate=True, turns=12)
+    x, y, radius, edge, _, _, _, misfit, visible, contrast, gain, *_ = out
+    np.testing.assert_allclose((x, y), (28.3, 27.6), atol=1e-3)
+    np.testing.assert_allclose((radius, edge), (RADIUS, sigma), rtol=0.02)
+    np.testing.assert_allclose((contrast, gain), (BOB - WALL, 1.0), rtol=2e-3)
+    assert misfit < 0.003 * abs(BOB - WALL)
+    assert visible == 1.0
 
-    def mean_share(radius):
-        along = (np.arange(200) + 0.5) / 200 - 0.5
-        return np.mean(
-            [
-                0.5
-                + 0.5 * erf((radius - np.hypot(x - 28.3 - u * streak[0], y - 27.6 - u * streak[1])) / (sigma * 2**0.5))
-                for u in along
-            ],
-            axis=0,
-        )
 
-    assert np.abs(share - mean_share(RADIUS)).max() < 0.004
-    assert np.abs(rise - (mean_share(RADIUS + 1e-3) - mean_share(RADIUS - 1e-3)) / 2e-3).max() < 0.02
+def test_pictures_of_any_layout_give_the_same_place():
+    from toolkit.trackers.disc import fit_disc
+
+    image = blurred_disc(28.3, 27.6, 0.9)
+    patch, look, guess = patch_of(image), Look(RADIUS, 0.9, BOB - WALL, 1.0), Guess(328.4, 527.4)
+    wide = np.zeros((56, 80), np.float32)
+    wide[:, 10:66] = image
+    expected = fit_disc(patch, look, guess)
+    for other in (np.asfortranarray(image), image.astype(float), wide[:, 10:66]):
+        np.testing.assert_array_equal(fit_disc(patch._replace(image=other), look, guess), expected)

@@ -1,15 +1,19 @@
 """The compiled inside of the disc fit.
 
-`gather` lists the pixels that matter, `cover` says how much of each the bob hides, `fit` steps towards the least sum of
-squares until the disc lies still. The loops over the lists are plain and write one to three of them each, for then the
-compiler makes vector instructions of them. Module-level functions, because a closure that calls other compiled functions
-is compiled anew in every process.
+`gather` lists the pixels that matter, `cover_still` and `cover_moving` say how much of each the bob hides, `fit` steps
+towards the least sum of squares until the disc lies still. Plain pointers and few calls, so that it compiles in seconds;
+the listed pixels are worked through in chunks that stay in the processor's nearest memory, in plain loops that write one
+to three lists each, for then the compiler makes vector instructions of them.
 """
 
 from __future__ import annotations
 
-import numba
-import numpy as np
+import math
+from typing import Any
+
+from numba import njit
+
+from toolkit.motion.kernels.pointer import pixels, reals, skip
 
 # The edge is the integral of the compact kernel (1 − v²)² (A + B v² + C v⁴) / h, v = depth/h, fitted to the normal
 # distribution (to 0.001 of its integral). As polynomials in q = v²: E = 1/2 + v (E0 + E1 q + …), its integral over v
@@ -21,358 +25,385 @@ E0, E1, E2, E3, E4 = K0, K1 / 3, K2 / 5, K3 / 7, K4 / 9
 I0, I1, I2, I3, I4 = E0 / 2, E1 / 4, E2 / 6, E3 / 8, E4 / 10
 MARGIN = 0.8  # px that the outline may move before the pixels are listed anew
 SECTORS = 24
-_SUMS_IN_ANY_ORDER = {"reassoc", "contract", "nsz"}
+_P = 8  # parameters: cx, cy, three of the shade, gain, R, h
+CHUNK = 128
+
+# The caller's numbers: what is known, then the result from OUT on.
+CX, CY, RADIUS, EDGE, STREAK_X, STREAK_Y, STRING_X, STRING_Y, WEDGE, NOISE, CONTRAST, OUT = range(12)
+RESULTS = 14
+# The caller's places: addresses of the three pictures, of the numbers and of the room to work in, then whole numbers:
+# size, elements from one row to the next, FREE parameters, whether to look INSIDE, most TURNS, MOST pixels.
+IMAGE, BACK, SEEN, NUMBERS, ROOM, ROWS, COLUMNS, IMAGE_ROW, BACK_ROW, SEEN_ROW, FREE, INSIDE, TURNS, MOST = range(14)
+# The room: lists of MOST pixels, lists of a CHUNK of them, and small things.
+_X, _Y, _BRIGHT, _WALL, _KNOWN, _SHARE, _REST, LISTS = range(8)
+_SLOPE, _RISE, _WIDEN, _NEAR, _DEPTH, _LIFT, _WEIGHT, _EDGE, _END = (k * CHUNK for k in (0, *range(_P, _P + 8)))
+_NORMAL, _RIGHT, _STEP, _DISC, _LISTED, _SHADE = (_END + k for k in (0, 64, 80, 88, 96, 104))
+_SECTORS = _SHADE + 8
+SPARE = _SECTORS + 2 * SECTORS
+
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy",
+    "no_rewrites": True,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+_once = njit(**_OPTIONS)
+_loop = njit(**_OPTIONS, fastmath={"reassoc", "contract", "nsz", "arcp"})  # sums in any order
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def gather(image, back, seen, disc, streak, string, inside, x, y, bright, wall, doubt):
-    """List the pixels about the outline and, if `inside`, every second one of every second row within it; their number.
+@_once
+def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
+    """List the pixels about the outline and, if INSIDE, every second one of every second row within it; their number.
 
-    disc : cx, cy, R, h.    string : its direction and the squared cosine of the half angle of the wedge left out.
-    doubt : variance of the wall's level in units of the noise's.
+    disc : cx, cy, R, h. The string's wedge, left out, is given by its direction and the squared cosine of its half angle;
+    `known` is one over the variance of the wall's level, in units of the noise's.
     """
-    rows, columns = image.shape
-    cx, cy, radius, soft = disc[0], disc[1], disc[2], disc[3]
-    length = np.sqrt(streak[0] * streak[0] + streak[1] * streak[1])
-    bend = 0.125 * length * length / radius  # by which a streak's ends leave the tangent
-    band = soft + MARGIN + bend
-    outer, inner = radius + band + 0.5 * length, max(0.0, radius - band - 0.5 * length)
+    image, back, seen = pixels(places, IMAGE), pixels(places, BACK), pixels(places, SEEN)
+    columns, most = places[COLUMNS], places[MOST]
+    x, y, bright = lists, skip(lists, _Y * most), skip(lists, _BRIGHT * most)
+    wall, known = skip(lists, _WALL * most), skip(lists, _KNOWN * most)
+    cx, cy, radius = disc[0], disc[1], disc[2]
+    sx, sy, wedge = numbers[STRING_X], numbers[STRING_Y], numbers[WEDGE]
+    bx, by = 0.5 * numbers[STREAK_X], 0.5 * numbers[STREAK_Y]
+    reach = math.sqrt(bx * bx + by * by)
+    band = disc[3] + MARGIN + 0.5 * reach * reach / radius  # a streak's ends leave the tangent
+    outer, inner = radius + band + reach, radius - band - reach
     count = 0
-    for row in range(max(0, int(np.ceil(cy - outer))), min(rows - 1, int(np.floor(cy + outer))) + 1):
+    for row in range(places[ROWS]):
         dy = row - cy
-        half = np.sqrt(max(0.0, outer * outer - dy * dy))
-        hole = np.sqrt(max(0.0, inner * inner - dy * dy))
-        skips = not inside or row & 1
-        column = max(0, int(np.ceil(cx - half))) - 1
-        last = min(columns - 1, int(np.floor(cx + half)))
-        while column < last and count < x.size:
-            column += 1
+        half = outer * outer - dy * dy
+        if half < 0.0:
+            continue
+        half = math.sqrt(half)
+        hole = inner * abs(inner) - dy * dy
+        hole = math.sqrt(hole) if hole > 0.0 else 0.0
+        skips = places[INSIDE] == 0 or row & 1 == 1
+        image_row, back_row, seen_row = row * places[IMAGE_ROW], row * places[BACK_ROW], row * places[SEEN_ROW]
+        column = math.ceil(cx - half) if cx > half else 0
+        last = math.floor(cx + half)
+        last = last if last < columns else columns - 1
+        while column <= last:
             dx = column - cx
-            if skips and -hole < dx < hole:
-                column = int(np.floor(cx + hole))
-                continue
             square = dx * dx + dy * dy
-            along = dx * string[0] + dy * string[1]
-            if along > 0.0 and along * along > string[2] * square:
-                continue
-            if length > 0.0:  # across its way the streak is narrow
-                d = np.sqrt(square) + 1e-9
-                near = band + 0.5 * abs(streak[0] * dx + streak[1] * dy) / d
-                if d > radius + near or (d < radius - near and (skips or column & 1)):
-                    continue
-            elif column & 1 and square < inner * inner:
-                continue
-            x[count], y[count], bright[count], wall[count] = column, row, image[row, column], back[row, column]
-            n = seen[row, column]
-            doubt[count] = 1.0 / n if n > 0.0 else 3.0
-            count += 1
+            along = dx * sx + dy * sy
+            keep = (along <= 0.0) | (along * along <= wedge * square)
+            if reach > 0.0:  # across its way the streak is narrow
+                d = math.sqrt(square) + 1e-9
+                off = (d - radius) * d
+                near = band * d + abs(bx * dx + by * dy)
+                keep &= (off <= near) & ((not skips and column & 1 == 0) or off >= -near)
+            x[count] = column
+            y[count] = row
+            bright[count] = image[image_row + column]
+            wall[count] = back[back_row + column]
+            n = seen[seen_row + column]
+            known[count] = n if n > 0.0 else 1.0 / 3.0
+            count += keep
+            column += 1
+            if abs(column - cx) < hole:
+                column = math.ceil(cx + hole) if skips else column + (column & 1)
     return count
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS_IN_ANY_ORDER)
-def measure_depth(x, y, cx, cy, radius, soft, depth, nearness):
+@_loop
+def measure_depth(
+    x: Any, y: Any, n: int, cx: float, cy: float, radius: float, soft: float, depth: Any, near: Any
+) -> None:
     """How deep each pixel lies within the outline, in h, and one over its distance from the centre."""
-    narrow = 1.0 / soft
-    for i in range(x.size):
+    for i in range(n):
         dx, dy = x[i] - cx, y[i] - cy
         square = dx * dx + dy * dy + 1e-18
-        one = 1.0 / np.sqrt(square)
-        depth[i] = (radius - one * square) * narrow
-        nearness[i] = one
+        one = 1.0 / math.sqrt(square)
+        depth[i] = (radius - one * square) / soft
+        near[i] = one
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS_IN_ANY_ORDER)
-def cover_still(depth, soft, share, rise, widen):
-    """Add what a disc at rest covers of each pixel, and its slopes with the radius and with h."""
-    narrow = 1.0 / soft
-    for i in range(depth.size):
-        v = min(1.0, max(-1.0, depth[i]))
+@_loop
+def cover_still(depth: Any, n: int, soft: float, share: Any, rise: Any, widen: Any) -> None:
+    """What a disc at rest covers of each pixel, and its slopes with the radius and with h."""
+    for i in range(n):
+        v = depth[i]
+        v = 1.0 if v > 1.0 else -1.0 if v < -1.0 else v
         q = v * v
-        e = narrow * (K0 + q * (K1 + q * (K2 + q * (K3 + q * K4))))
-        share[i] += 0.5 + v * (E0 + q * (E1 + q * (E2 + q * (E3 + q * E4))))
+        share[i] = 0.5 + v * (E0 + q * (E1 + q * (E2 + q * (E3 + q * E4))))
+        e = (K0 + q * (K1 + q * (K2 + q * (K3 + q * K4)))) / soft
+        rise[i] = e
+        widen[i] = -e * v
+
+
+@_loop
+def cover_moving(
+    depth: Any, lift: Any, n: int, part: float, soft: float, before: Any, edge: Any, whole: Any,
+    share: Any, rise: Any, widen: Any,
+) -> None:  # fmt: skip
+    """Add what it covers while the depth goes evenly from `before` to `depth` in `part` of the exposure (0: only note the
+    start): the differences of the edge function's integral and of itself, over the way."""
+    for i in range(n):
+        a = before[i]
+        b = depth[i] + lift[i]
+        b = b if abs(b - a) > 1e-6 else a + 1e-6
+        v = 1.0 if b > 1.0 else -1.0 if b < -1.0 else b
+        q = v * v
+        level = v * (E0 + q * (E1 + q * (E2 + q * (E3 + q * E4))))
+        # the integral goes on straight beyond ±1
+        sum_ = 0.5 * (b + abs(b - v)) + q * (I0 + q * (I1 + q * (I2 + q * (I3 + q * I4))))
+        one = part / (b - a)
+        share[i] += one * (sum_ - whole[i])
+        e = one * (level - edge[i]) / soft
+        middle = 0.5 * (a + b)
         rise[i] += e
-        widen[i] -= e * v
+        widen[i] -= e * (1.0 if middle > 1.0 else -1.0 if middle < -1.0 else middle)
+        before[i] = b
+        edge[i] = level
+        whole[i] = sum_
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS_IN_ANY_ORDER)
-def cover_piece(before, after, lift, part, soft, share, rise, widen):
-    """Add what it covers while the depth goes evenly from `before` to `after`, in `part` of the exposure."""
-    for i in range(before.size):
-        a, b = before[i] + lift[i], after[i] + lift[i]
-        pa, pb = min(1.0, max(-1.0, a)), min(1.0, max(-1.0, b))
-        qa, qb = pa * pa, pb * pb
-        # the edge function's integral at both ends, which goes on straight beyond ±1
-        ia = 0.5 * (a + abs(a - pa)) + qa * (I0 + qa * (I1 + qa * (I2 + qa * (I3 + qa * I4))))
-        ib = 0.5 * (b + abs(b - pb)) + qb * (I0 + qb * (I1 + qb * (I2 + qb * (I3 + qb * I4))))
-        v = min(1.0, max(-1.0, 0.5 * (a + b)))
-        q = v * v
-        middle = 0.5 + v * (E0 + q * (E1 + q * (E2 + q * (E3 + q * E4))))
-        share[i] += part * (middle if abs(b - a) < 1e-3 else (ib - ia) / (b - a))
-    narrow = part / soft
-    for i in range(before.size):
-        a, b = before[i] + lift[i], after[i] + lift[i]
-        pa, pb = min(1.0, max(-1.0, a)), min(1.0, max(-1.0, b))
-        qa, qb = pa * pa, pb * pb
-        ea = pa * (E0 + qa * (E1 + qa * (E2 + qa * (E3 + qa * E4))))
-        eb = pb * (E0 + qb * (E1 + qb * (E2 + qb * (E3 + qb * E4))))
-        v = min(1.0, max(-1.0, 0.5 * (a + b)))
-        q = v * v
-        middle = K0 + q * (K1 + q * (K2 + q * (K3 + q * K4)))
-        e = narrow * (middle if abs(b - a) < 1e-3 else (eb - ea) / (b - a))
-        rise[i] += e
-        widen[i] -= e * v
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def cover(x, y, disc, streak, share, rise, widen, nearness, before, after, lift):
-    """What the disc covers of each pixel in the mean over the exposure, and its slopes; along the streak the depth is
-    taken as linear in each of a few pieces, lifted by the mean of how far its curve is above them."""
-    cx, cy, radius, soft = disc[0], disc[1], disc[2], disc[3]
-    for i in range(x.size):
-        share[i] = rise[i] = widen[i] = 0.0
-    length = np.sqrt(streak[0] * streak[0] + streak[1] * streak[1])
-    if length >= 0.05:
-        pieces = 1 + int(min(15.0, length / np.sqrt(radius + 1.0)))
-        measure_depth(x, y, cx, cy, radius, soft, after, nearness)
-        for i in range(x.size):
-            across = (streak[0] * (y[i] - cy) - streak[1] * (x[i] - cx)) * nearness[i] / pieces
-            lift[i] = across * across * nearness[i] / (12.0 * soft)
-        for k in range(pieces + 1):
-            u = k / pieces - 0.5
-            measure_depth(x, y, cx + u * streak[0], cy + u * streak[1], radius, soft, after, nearness)
-            if k:
-                cover_piece(before, after, lift, 1.0 / pieces, soft, share, rise, widen)
-            before, after = after, before
-    measure_depth(x, y, cx, cy, radius, soft, after, nearness)
-    if length < 0.05:
-        cover_still(after, soft, share, rise, widen)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS_IN_ANY_ORDER)
-def compare(x, y, bright, wall, doubt, disc, shade, cut, share, rise, widen, nearness, slope, rest, weight):
+@_loop
+def compare(
+    x: Any, y: Any, n: int, bright: Any, wall: Any, known: Any, disc: Any, shade: Any, cut: float,
+    share: Any, rest: Any, work: Any,
+) -> None:  # fmt: skip
     """Slopes of the model with all eight parameters, what it leaves of the picture, and each pixel's weight."""
-    cx, cy, unit = disc[0], disc[1], 1.0 / disc[2]
-    f0, fx, fy, gain = shade[0], shade[1] * unit, shade[2] * unit, shade[3]
-    step = slope[6]
-    for i in range(x.size):
-        step[i] = f0 + fx * (x[i] - cx) + fy * (y[i] - cy)
-    for i in range(x.size):
-        rest[i] = bright[i] - gain * wall[i] * (1.0 - share[i]) - step[i] * share[i]
-    for i in range(x.size):
+    rise, widen, near, weight = skip(work, _RISE), skip(work, _WIDEN), skip(work, _NEAR), skip(work, _WEIGHT)
+    by_x, by_y, flat, tilt_x = work, skip(work, CHUNK), skip(work, 2 * CHUNK), skip(work, 3 * CHUNK)
+    tilt_y, by_gain = skip(work, 4 * CHUNK), skip(work, 5 * CHUNK)
+    by_radius, by_soft = skip(work, 6 * CHUNK), skip(work, 7 * CHUNK)
+    cx, cy = disc[0], disc[1]
+    f0, fx, fy, gain = shade[0], shade[1], shade[2], shade[3]
+    for i in range(n):
+        tilt_x[i] = x[i] - cx
+        tilt_y[i] = y[i] - cy
+    for i in range(n):
+        by_soft[i] = f0 + fx * tilt_x[i] + fy * tilt_y[i] - gain * wall[i]
+    for i in range(n):
+        rest[i] = bright[i] - gain * wall[i] - by_soft[i] * share[i]
+    for i in range(n):
         bare = 1.0 - share[i]
-        weight[i] = 1.0 / (1.0 + doubt[i] * bare * bare) if abs(rest[i]) <= cut else 0.0
-    for i in range(x.size):
-        step[i] -= gain * wall[i]
-        slope[7, i] = step[i] * widen[i]
-    for i in range(x.size):
-        step[i] *= rise[i]
-    for i in range(x.size):
-        slope[0, i] = step[i] * (x[i] - cx) * nearness[i] - share[i] * fx
-    for i in range(x.size):
-        slope[1, i] = step[i] * (y[i] - cy) * nearness[i] - share[i] * fy
-    for i in range(x.size):
-        slope[2, i] = share[i]
-        slope[3, i] = share[i] * (x[i] - cx) * unit
-    for i in range(x.size):
-        slope[4, i] = share[i] * (y[i] - cy) * unit
-        slope[5, i] = (1.0 - share[i]) * wall[i]
+        by_gain[i] = bare * wall[i]
+        weight[i] = known[i] / (known[i] + bare * bare) if abs(rest[i]) <= cut else 0.0
+    for i in range(n):
+        by_radius[i] = by_soft[i] * rise[i]
+        by_soft[i] *= widen[i]
+    for i in range(n):
+        flat[i] = share[i]
+        by_x[i] = by_radius[i] * near[i] * tilt_x[i] - fx * share[i]
+        by_y[i] = by_radius[i] * near[i] * tilt_y[i] - fy * share[i]
+    for i in range(n):
+        tilt_x[i] *= share[i]
+        tilt_y[i] *= share[i]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS_IN_ANY_ORDER)
-def normal_equations(slope, weight, rest, free, normal, right, weighted):
-    """Fill normal (the lower half) and right; the weighted sum of squares."""
-    squares = 0.0
-    for i in range(rest.size):
+@_loop
+def add_up(work: Any, rest: Any, n: int, free: int, normal: Any, right: Any) -> None:
+    """Add a chunk to the normal equations: rows of four, the lower half is what counts. Behind their right side of eight: the
+    weighted sum of squares, the sum of the weights."""
+    weight = skip(work, _WEIGHT)
+    squares = weights = 0.0
+    for i in range(n):
         squares += weight[i] * rest[i] * rest[i]
+        weights += weight[i]
+    right[8] += squares
+    right[9] += weights
     for a in range(free):
-        total = 0.0
-        for i in range(rest.size):
-            weighted[i] = slope[a, i] * weight[i]
-            total += weighted[i] * rest[i]
-        right[a] = total
-        for b in range(a + 1):
-            total = 0.0
-            for i in range(rest.size):
-                total += weighted[i] * slope[b, i]
-            normal[a, b] = total
-    return squares
+        mine = skip(work, a * CHUNK)
+        for b in range(0, a + 1, 4):
+            c0, c1, c2, c3 = (
+                skip(work, b * CHUNK), skip(work, (b + 1) * CHUNK), skip(work, (b + 2) * CHUNK), skip(work, (b + 3) * CHUNK)
+            )  # fmt: skip
+            s0 = s1 = s2 = s3 = total = 0.0
+            for i in range(n):
+                weighted = weight[i] * mine[i]
+                s0 += weighted * c0[i]
+                s1 += weighted * c1[i]
+                s2 += weighted * c2[i]
+                s3 += weighted * c3[i]
+                total += weighted * rest[i]
+            row = skip(normal, _P * a + b)
+            row[0] += s0
+            row[1] += s1
+            row[2] += s2
+            row[3] += s3
+            if b == 0:
+                right[a] += total
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def decompose(normal, lower, free):
-    """Cholesky; False where singular. A parameter on which nothing depends stays where it is."""
-    for a in range(free):
-        for b in range(a + 1):
-            value = normal[a, b] * (1.0 + 1e-9) if a == b else normal[a, b]
-            if a == b and value == 0.0:
-                lower[a, a] = 1.0
-                continue
-            for c in range(b):
-                value -= lower[a, c] * lower[b, c]
-            if a == b:
-                if not value > 1e-12 * normal[a, a]:
-                    return False
-                lower[a, a] = np.sqrt(value)
-            else:
-                lower[a, b] = value / lower[b, b]
+@_once
+def invert(a: Any, size: int, spare: Any) -> bool:
+    """Put the inverse in the place of a positive symmetric matrix of which the lower half is given (Gauss and Jordan); False
+    where singular. A parameter on which nothing depends gets a variance of zero."""
+    for i in range(size):
+        spare[i] = 1e-12 * a[(_P + 1) * i]
+        for j in range(i):
+            a[_P * j + i] = a[_P * i + j]
+    for k in range(size):
+        pivot = a[(_P + 1) * k]
+        if spare[k] == 0.0:
+            continue
+        if not pivot > spare[k]:
+            return False
+        a[(_P + 1) * k] = 1.0
+        for j in range(size):
+            a[_P * k + j] /= pivot
+        for i in range(size):
+            if i != k:
+                factor = a[_P * i + k]
+                a[_P * i + k] = 0.0
+                for j in range(size):
+                    a[_P * i + j] -= factor * a[_P * k + j]
     return True
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def solve(lower, right, step, free):
-    for a in range(free):
-        value = right[a]
-        for b in range(a):
-            value -= lower[a, b] * step[b]
-        step[a] = value / lower[a, a]
-    for a in range(free - 1, -1, -1):
-        value = step[a]
-        for b in range(a + 1, free):
-            value -= lower[b, a] * step[b]
-        step[a] = value / lower[a, a]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def look_around(x, y, share, wall, rest, disc, clean):
-    """In how much of the outline's sectors the bob was seen (the model is off by `clean` at most), the mean level of the
-    wall beside it, and the misfit (rms, each pixel's at most 2 `clean`) well inside; NaN where no such pixel was listed.
+@_once
+def look_around(lists: Any, most: int, count: int, disc: Any, clean: float, sectors: Any, out: Any) -> None:
+    """out[8] : in how much of the outline's sectors the bob was seen (the model is off by `clean` at most); out[12] : the
+    mean level of the wall beside it; out[13] : the misfit (rms, each pixel's at most 2 `clean`) well inside; NaN where no
+    such pixel was listed.
 
     What hides the bob is seen on it, what stands behind it only beside it: pixels that are the bob's for the most part count.
     """
-    good, total = np.zeros(SECTORS), np.zeros(SECTORS)
-    level = squares = 0.0
-    beside = within = 0
-    for i in range(x.size):
+    y, wall, share, rest = (
+        skip(lists, _Y * most), skip(lists, _WALL * most), skip(lists, _SHARE * most), skip(lists, _REST * most)
+    )  # fmt: skip
+    for k in range(2 * SECTORS):
+        sectors[k] = 0.0
+    level = squares = beside = within = 0.0
+    for i in range(count):
         if share[i] < 0.5:
             level += wall[i]
-            beside += 1
+            beside += 1.0
             continue
-        dx, dy = x[i] - disc[0], y[i] - disc[1]
+        dx, dy, off = lists[i] - disc[0], y[i] - disc[1], abs(rest[i])
         turn = dy / (abs(dx) + abs(dy) + 1e-12)  # sectors of equal diamond angle: no arctangent
         sector = int((1.0 + turn if dx >= 0.0 else 3.0 - turn) * (0.25 * SECTORS - 1e-6))
-        total[sector] += 1.0
-        good[sector] += abs(rest[i]) <= clean
-        if dx * dx + dy * dy < 0.64 * disc[2] * disc[2] and share[i] > 0.999:
-            squares += min(abs(rest[i]), 2.0 * clean) ** 2
-            within += 1
-    clear = present = 0
+        sectors[sector] += 1.0
+        if off <= clean:
+            sectors[SECTORS + sector] += 1.0
+        if share[i] > 0.999 and dx * dx + dy * dy < 0.64 * disc[2] * disc[2]:
+            off = off if off < 2.0 * clean else 2.0 * clean
+            squares += off * off
+            within += 1.0
+    clear = present = 0.0
     for k in range(SECTORS):
-        present += total[k] > 0.0
-        clear += total[k] > 0.0 and good[k] > 0.7 * total[k]
-    return (
-        clear / max(1, present),
-        level / beside if beside else np.nan,
-        np.sqrt(squares / within) if within else np.nan,
-    )
+        if sectors[k] > 0.0:
+            present += 1.0
+            if sectors[SECTORS + k] > 0.7 * sectors[k]:
+                clear += 1.0
+    out[8] = clear / present if present > 0.0 else 0.0
+    out[12] = level / beside if beside > 0.0 else math.nan
+    out[13] = math.sqrt(squares / within) if within > 0.0 else math.nan
 
 
-# one signature for patches of any layout: each would be compiled by itself, and this is the longest to compile
-_picture, _column, _number, _count = numba.float32[:, :], numba.float64[::1], numba.float64, numba.int64
-_SIGNATURE = numba.boolean(
-    _picture, _picture, _picture, _column, _column, _column, _number, _number, _count, numba.boolean, _count, _column
-)
+def fit(places: Any) -> None:
+    """Fit the disc; out[0] stays NaN where it did not settle: singular normal equations, the centre left the patch, or the
+    steps did not become small.
 
-
-@numba.njit(_SIGNATURE, cache=True, nogil=True, error_model="numpy")
-def fit(image, back, seen, start, streak, string, noise, contrast, free, inside, turns, out):
-    """Fit the disc; False where it did not settle: singular normal equations, the centre left the patch, or the steps
-    did not become small.
-
-    start : cx, cy, R, s.    streak : bx, by.    string : see `gather`.    contrast : bob less wall, 0 if unknown.
-    free : 6 (centre, shading, gain), 7 (and R) or 8 (and s).
+    numbers : cx, cy, R, s; streak; string (see `gather`); noise; contrast (bob less wall, 0 if unknown).
+    FREE : 6 (centre, shading, gain), 7 (and R) or 8 (and s).
     out : cx, cy, R, s, var_x, var_y, cov_xy, misfit, visible, contrast, gain, pixels, wall, misfit well inside.
+
+    Along a streak the depth of each pixel is taken as linear in each of a few pieces, lifted by the mean of how far its
+    curve is above them.
     """
-    rows, columns = image.shape
-    disc, listed = np.empty(4), np.empty(4)  # `listed` is the disc for which the pixels were listed
+    numbers, lists = reals(places, NUMBERS), reals(places, ROOM)
+    out, most, free = skip(numbers, OUT), places[MOST], places[FREE]
+    work = skip(lists, LISTS * most)
+    rise, widen, near, depth = skip(work, _RISE), skip(work, _WIDEN), skip(work, _NEAR), skip(work, _DEPTH)
+    lift, before, edge, whole = skip(work, _LIFT), skip(work, _WEIGHT), skip(work, _EDGE), work
+    normal, right, step = skip(work, _NORMAL), skip(work, _RIGHT), skip(work, _STEP)
+    disc, listed, shade = skip(work, _DISC), skip(work, _LISTED), skip(work, _SHADE)
+    bx, by, noise, contrast = numbers[STREAK_X], numbers[STREAK_Y], numbers[NOISE], numbers[CONTRAST]
     for k in range(4):
-        disc[k] = start[k] if k < 3 else start[k] * H_PER_SIGMA
-    length = np.sqrt(streak[0] * streak[0] + streak[1] * streak[1])
-    normal, lower = np.zeros((8, 8)), np.zeros((8, 8))
-    right, step = np.zeros(8), np.zeros(8)
-    shade = np.zeros(
-        4
-    )  # f0, fx, fy, gain: all 0 at first where nothing is known, then the first step finds these alone
+        disc[k] = numbers[CX + k]
+        listed[k] = math.inf
+        shade[k] = 0.0  # f0, its slopes, gain: where nothing is known, the first turn finds these alone
+    disc[3] *= H_PER_SIGMA
+    out[0] = math.nan
+    length = math.sqrt(bx * bx + by * by)
+    pieces = int(length / math.sqrt(disc[2] + 1.0)) + 1
+    pieces = pieces if pieces < 16 else 16
     first = 0 if contrast != 0.0 else 1  # the first turn on which the centre moves
-    lists, slope = np.empty((13, 0)), np.empty((8, 0))
-    moved = np.inf
-    count = 0
-    level, cut = 0.0, np.inf
-    settled = False
-    for turn in range(turns + first):
-        if moved > 0.75 * MARGIN:
-            width = 2.0 * (disc[3] + MARGIN) + 1.3 * length + 0.25 * length * length / disc[2]
-            room = 6.3 * (disc[2] + 3.0) * width + (0.8 * disc[2] * disc[2] if inside else 0.0) + 64.0
-            lists = np.empty((13, int(min(rows * columns, room))))
-            count = gather(
-                image, back, seen, disc, streak, string, inside, lists[0], lists[1], lists[2], lists[3], lists[4]
-            )
+    cut, count, level, damp, settled = math.inf, 0, 0.0, 1.0, False
+    for turn in range(places[TURNS] + first):
+        if turn >= first + 1:
+            cut = 0.25 * abs(shade[0] - shade[3] * level)
+            cut = cut if cut > 5.0 * noise else 5.0 * noise
+        moved = False
+        for k in range(4):
+            moved = moved or not abs(disc[k] - listed[k]) < 0.75 * MARGIN
+        if moved:
+            count = gather(places, numbers, lists, disc)
             if count < 12:
-                return False
-            slope = np.empty((8, count))
+                return
             for k in range(4):
                 listed[k] = disc[k]
-        x, y, bright, wall, doubt = (
-            lists[0, :count],
-            lists[1, :count],
-            lists[2, :count],
-            lists[3, :count],
-            lists[4, :count],
-        )
-        share, rise, widen, nearness = lists[5, :count], lists[6, :count], lists[7, :count], lists[8, :count]
-        rest, weight, spare = lists[9, :count], lists[10, :count], lists[11, :count]
         if turn == 0:
             for i in range(count):
-                level += wall[i] / count
+                level += lists[_WALL * most + i] / count
             if first == 0:
                 shade[0], shade[3] = level + contrast, 1.0
-        cover(x, y, disc, streak, share, rise, widen, nearness, spare, lists[12, :count], rest)
-        compare(x, y, bright, wall, doubt, disc, shade, cut, share, rise, widen, nearness, slope, rest, weight)
-        squares = normal_equations(slope, weight, rest, free, normal, right, spare)
-        if not decompose(normal, lower, free):
-            return False
-        solve(lower, right, step, free)
-        size = np.sqrt(step[0] * step[0] + step[1] * step[1])
-        most = 0.5 * disc[3] + 0.3 * length
-        damp = 1.0 if size <= most else most / size
-        disc[0] += damp * step[0]
-        disc[1] += damp * step[1]
+        for k in range(_DISC - _NORMAL):
+            normal[k] = 0.0
+        cx, cy, radius, soft = disc[0], disc[1], disc[2], disc[3]
+        for begin in range(0, count, CHUNK):
+            n = count - begin if count - begin < CHUNK else CHUNK
+            x, y, bright = skip(lists, begin), skip(lists, _Y * most + begin), skip(lists, _BRIGHT * most + begin)
+            wall, known = skip(lists, _WALL * most + begin), skip(lists, _KNOWN * most + begin)
+            share, rest = skip(lists, _SHARE * most + begin), skip(lists, _REST * most + begin)
+            measure_depth(x, y, n, cx, cy, radius, soft, depth, near)
+            if length < 0.05:
+                cover_still(depth, n, soft, share, rise, widen)
+            else:
+                for i in range(n):
+                    across = (bx * (y[i] - cy) - by * (x[i] - cx)) * near[i] / pieces
+                    lift[i] = across * across * near[i] / (12.0 * soft)
+                    share[i] = rise[i] = widen[i] = before[i] = edge[i] = whole[i] = 0.0
+                for k in range(pieces + 1):
+                    u = k / pieces - 0.5
+                    measure_depth(x, y, n, cx + u * bx, cy + u * by, radius, soft, depth, near)
+                    part = 1.0 / pieces if k > 0 else 0.0
+                    cover_moving(depth, lift, n, part, soft, before, edge, whole, share, rise, widen)
+                measure_depth(x, y, n, cx, cy, radius, soft, depth, near)
+            compare(x, y, n, bright, wall, known, disc, shade, cut, share, rest, work)
+            add_up(work, rest, n, free, normal, right)
+        if not invert(normal, free, step):
+            return
+        for a in range(free):
+            step[a] = 0.0
+            for b in range(free):
+                step[a] += normal[_P * a + b] * right[b]
+        size = math.sqrt(step[0] * step[0] + step[1] * step[1])
+        longest = 0.5 * soft + 0.3 * length
+        damp = 1.0 if size <= longest else longest / size
         for k in range(4):
             shade[k] += damp * step[2 + k]
+        disc[0] += damp * step[0]
+        disc[1] += damp * step[1]
         still = size < 0.03
         if free > 6:
-            disc[2] += min(max(damp * step[6], -0.2 * disc[2]), 0.2 * disc[2])
+            grown = damp * step[6] / radius
+            disc[2] *= 1.0 + (0.2 if grown > 0.2 else -0.2 if grown < -0.2 else grown)
             still = still and abs(step[6]) < 0.02
         if free > 7:
-            disc[3] = min(max(disc[3] + damp * step[7], 0.8), 1.2 * disc[2])
+            soft += damp * step[7]
+            disc[3] = 0.8 if soft < 0.8 else 1.2 * disc[2] if soft > 1.2 * disc[2] else soft
             still = still and abs(step[7]) < 0.05
-        if not (0.0 <= disc[0] <= columns - 1.0 and 0.0 <= disc[1] <= rows - 1.0):
-            return False
-        moved = 0.0
-        for k in range(4):
-            moved = max(moved, abs(disc[k] - listed[k]))
+        if not (0.0 <= disc[0] <= places[COLUMNS] - 1.0 and 0.0 <= disc[1] <= places[ROWS] - 1.0):
+            return
         settled = still or free == 8 or (damp == 1.0 and size < 0.3)
-        if still and cut < np.inf:
+        if still and cut < math.inf:
             break
-        if turn >= first:
-            cut = max(5.0 * noise, 0.25 * abs(shade[0] - shade[3] * level))
-    weights = gained = 0.0
-    for i in range(count):
-        weights += weight[i]
+    clean = 0.12 * abs(shade[0] - shade[3] * level)
+    clean = clean if clean > 5.0 * noise else 5.0 * noise
+    look_around(lists, most, count, disc, clean, skip(work, _SECTORS), out)
+    if not settled or right[9] < 6.0 or math.isnan(out[12]):
+        return
+    squares = right[8]
     for a in range(free):  # by the last step, which was not looked at again
-        gained += (2.0 - damp) * damp * step[a] * right[a]
-    visible, level, within = look_around(
-        x, y, share, wall, rest, disc, max(5.0 * noise, 0.12 * abs(shade[0] - shade[3] * level))
-    )
-    if not settled or weights < 6.0 or np.isnan(level):
-        return False
-    misfit = np.sqrt(max(0.0, squares - gained) / max(1.0, weights - free))
-    for which in range(2):  # covariance of the centre: solve for the first two unit vectors
-        for k in range(8):
-            right[k] = 1.0 if k == which else 0.0
-        solve(lower, right, step, free)
-        out[4 + which] = step[which] * misfit * misfit
-        out[6] = step[1 - which] * misfit * misfit
-    out[0], out[1], out[2], out[3] = disc[0], disc[1], disc[2], disc[3] / H_PER_SIGMA
-    out[7], out[8], out[9], out[10] = misfit, visible, shade[0] - shade[3] * level, shade[3]
-    out[11], out[12], out[13] = count, level, within
-    return True
+        squares -= (2.0 - damp) * damp * step[a] * right[a]
+    spare = right[9] - free
+    variance = squares / (spare if spare > 1.0 else 1.0) if squares > 0.0 else 0.0
+    for k in range(4):
+        out[k] = disc[k]
+    out[3] /= H_PER_SIGMA
+    out[4], out[5], out[6] = variance * normal[0], variance * normal[_P + 1], variance * normal[1]
+    out[7], out[9], out[10], out[11] = math.sqrt(variance), shade[0] - shade[3] * out[12], shade[3], count

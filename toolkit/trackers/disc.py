@@ -9,7 +9,11 @@ Gauss–Newton over (cx, cy, f0, fx, fy, g) and, when calibrating, (R, h); pixel
 
 from __future__ import annotations
 
-from math import cos, isfinite, sin, sqrt
+import ctypes
+import threading
+from functools import cache
+from math import cos, isnan, sin, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -24,30 +28,78 @@ def fit_disc(
 
     `calibrate` lets radius and edge go free; `soften` widens the edge, and with it the range of capture.
     """
-    from toolkit.trackers._disc_kernel import fit
-
-    out = np.zeros(14)
-    start = np.array((guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften), float)
-    streak = np.array((guess.streak_x_px, guess.streak_y_px), float)
-    string = np.array((0.0, 0.0, 1.0))
-    if guess.string_rad == guess.string_rad:
-        string[:] = cos(guess.string_rad), sin(guess.string_rad), cos(min(0.9, 0.2 + 3.0 / look.radius_px)) ** 2
     plain = soften == 1.0
     free = 8 if calibrate else 7 if look.radius_free and plain else 6
-    contrast = look.contrast if plain else 0.0
-    good = fit(
-        patch.image, patch.back, patch.seen, start, streak, string, look.noise, contrast, free, look.even, turns, out
-    )
-    return out if good and isfinite(out[:13].sum()) else None
+    out = _fit(patch, look, guess, free, turns, soften, look.contrast if plain else 0.0)
+    return None if out is None else np.array(out)
 
 
 def locate(patch: Patch, look: Look, guess: Guess) -> Place:
     """The bob's centre by the disc fit; radius and edge are those of `look`."""
-    out = fit_disc(patch, look, guess)
+    out = _fit(patch, look, guess, 7 if look.radius_free else 6, 7, 1.0, look.contrast)
     if out is None or out[4] <= 0 or out[5] <= 0:
         return NOWHERE
-    cx, cy, _, _, xx, yy, _, misfit, visible, contrast, gain, _, wall, _ = out.tolist()
+    cx, cy, _, _, xx, yy, _, misfit, visible, contrast, gain, _, wall, _ = out
     return Place(cx + patch.x_px, cy + patch.y_px, sqrt(xx), sqrt(yy), misfit, visible, contrast, gain * wall)
+
+
+_KNOWN, _RESULTS, _PLACES = 11, 14, 15  # numbers that the kernel takes and gives, and places that it takes
+_SPARE = 4096  # numbers that it needs beside its seven lists of pixels, and more
+
+
+class _Desk(threading.local):
+    """What one thread works on from frame to frame."""
+
+    def __init__(self) -> None:
+        self.numbers = (ctypes.c_double * (_KNOWN + _RESULTS))()
+        self.places = (ctypes.c_int64 * _PLACES)()
+        self.room = np.empty(0)
+        self.at = ctypes.addressof(self.places)
+        self.numbers_at, self.room_at = ctypes.addressof(self.numbers), 0
+
+    def provide(self, pixels: int) -> None:
+        if self.room.size < 7 * pixels + _SPARE:
+            self.room = np.empty(7 * pixels + _SPARE)
+            self.room_at = self.room.ctypes.data
+
+
+_desk = _Desk()
+
+
+@cache
+def _kernel() -> Any:
+    from toolkit.motion.compiled import kernel
+
+    return kernel("fit", "toolkit.trackers._disc_kernel", "the disc fit")
+
+
+def _fit(
+    patch: Patch, look: Look, guess: Guess, free: int, turns: int, soften: float, contrast: float
+) -> list[float] | None:
+    desk, (rows, columns) = _desk, patch.image.shape
+    desk.provide(rows * columns)
+    string = 0.0, 0.0, 1.0
+    if not isnan(guess.string_rad):
+        string = cos(guess.string_rad), sin(guess.string_rad), cos(min(0.9, 0.2 + 3.0 / look.radius_px)) ** 2
+    desk.numbers[:_KNOWN] = (
+        guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften,
+        guess.streak_x_px, guess.streak_y_px, *string, look.noise, contrast,
+    )  # fmt: skip
+    image, back, seen = (
+        p if p.strides[1] == 4 and p.dtype == np.float32 else np.ascontiguousarray(p, np.float32) for p in patch[:3]
+    )
+    desk.places[:] = (
+        _address(image), _address(back), _address(seen), desk.numbers_at, desk.room_at, rows, columns,
+        image.strides[0] // 4, back.strides[0] // 4, seen.strides[0] // 4, free, look.even, turns, rows * columns, 0,
+    )  # fmt: skip
+    _kernel()(desk.at + 8 * (_PLACES - 1), None, desk.at)
+    out = desk.numbers[_KNOWN:]
+    return None if isnan(out[0]) else out
+
+
+def _address(picture: np.ndarray) -> int:
+    address: int = picture.__array_interface__["data"][0]
+    return address
 
 
 LOCALISER = Localiser("disc", "least squares of a shaded disc with a soft edge and motion blur (default)", locate)
