@@ -141,57 +141,72 @@ def sample_posterior(result: FitResult, steps: int = 500, walkers: int = 32, see
 
 @dataclass(frozen=True)
 class Bands:
-    """The fitted motion with its standard uncertainty at the series' times, (n,) each; tension and energy need mass and
-    length and are None without. sigma_* hold what the parameters' covariance brings, not the scatter of the points."""
+    """The fitted motion with its standard uncertainty at times t_s, (n,) each. sigma_* hold what the parameters' covariance
+    brings, not the scatter of the points.
+
+    theta_rad is as the camera sees it. tension is over the weight and energy over m g ℓ, both 1-D and always there;
+    tension_n and energy_j need the mass and are None without.
+    """
 
     theta_rad: np.ndarray
     sigma_theta_rad: np.ndarray
     omega_rad_per_s: np.ndarray
     sigma_omega_rad_per_s: np.ndarray
+    tension: np.ndarray
+    sigma_tension: np.ndarray
+    energy: np.ndarray
+    sigma_energy: np.ndarray
     tension_n: np.ndarray | None = None
     sigma_tension_n: np.ndarray | None = None
     energy_j: np.ndarray | None = None
     sigma_energy_j: np.ndarray | None = None
 
 
-def bands(result: FitResult) -> Bands:
-    """θ(t), θ̇(t), T = m(g cos θ + ℓ θ̇²) and E = m ℓ²θ̇²/2 + m g ℓ (1 − cos θ) of a fit (θ from the vertical), with u
-    from the covariance through the analytic derivatives. With `small_angle` models the same T and E are evaluated."""
-    problem = _solved(result)
-    values = _values(result)
-    motion = problem.motion(values, None, result.free)
-    c = result.covariance
+def bands(result: FitResult, t_s: np.ndarray | None = None) -> Bands:
+    """θ(t), θ̇(t), T/(m g) = cos θ + θ̇²/ω_g² and E/(m g ℓ) = θ̇²/(2ω_g²) + 1 − cos θ of a fit (θ from the vertical), with u
+    from the covariance through the analytic derivatives, at `t_s` (default: the series' times). `small_angle` models too."""
+    problem, values, names = _solved(result), _values(result), result.free
+    motion = problem.motion(values, None if t_s is None else t_s - problem.shift_s, names)
+    omega_g = problem.reduce(values)[0]["omega_g"]
+    g = problem.scene.environment.gravity_m_per_s2
+    by_omega_g = np.zeros(len(names))
+    if "omega_g" in names:
+        by_omega_g[names.index("omega_g")] = 1.0
+    elif "length" in names:
+        by_omega_g[names.index("length")] = -omega_g / (2 * values["length"])
 
     def spread(by: np.ndarray) -> np.ndarray:
-        return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, c, by), 0.0))
+        return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, result.covariance, by), 0.0))
 
-    theta, omega, d_theta, d_omega = motion.theta, motion.omega, motion.d_theta, motion.d_omega
-    _, seen_by, _ = problem.predict(values, result.free)
-    found = Bands(result.theta_rad, spread(seen_by), omega, spread(d_omega))
-    m = problem.scene.pendulum.mass_kg
-    if m is None:
-        return found
-    g = problem.scene.environment.gravity_m_per_s2
-    length = values.get("length", g / problem.reduce(values)[0]["omega_g"] ** 2)
-    by_length = np.zeros(len(result.free))
-    if "length" in result.free:
-        by_length[result.free.index("length")] = 1.0
-    elif "omega_g" in result.free:
-        by_length[result.free.index("omega_g")] = -2 * length / values["omega_g"]
-    sine, cosine = np.sin(theta), np.cos(theta)
-    tension = m * (g * cosine + length * omega**2)
-    energy = m * length * (length * omega**2 / 2 + g * (1 - cosine))
-    d_tension = m * (
-        -(g * sine)[:, None] * d_theta + 2 * length * omega[:, None] * d_omega + (omega**2)[:, None] * by_length
+    scale = 1 + values.get("angle_scale", 0.0)
+    d_seen = scale * motion.d_theta
+    for name, by in (("theta_offset", 1.0), ("angle_scale", motion.theta)):
+        if name in names:
+            d_seen[:, names.index(name)] = by
+    theta, omega, sine = motion.theta, motion.omega / omega_g, np.sin(motion.theta)[:, None]
+    d_omega = motion.d_omega / omega_g - omega[:, None] * by_omega_g / omega_g  # of θ̇/ω_g
+    tension, d_tension = np.cos(theta) + omega**2, 2 * omega[:, None] * d_omega - sine * motion.d_theta
+    energy, d_energy = omega**2 / 2 + 1 - np.cos(theta), omega[:, None] * d_omega + sine * motion.d_theta
+    found = Bands(
+        scale * theta + values.get("theta_offset", 0.0),
+        spread(d_seen),
+        motion.omega,
+        spread(motion.d_omega),
+        tension,
+        spread(d_tension),
+        energy,
+        spread(d_energy),
     )
-    d_energy = m * length * (length * omega[:, None] * d_omega + (g * sine)[:, None] * d_theta)
-    d_energy += m * (length * omega**2 + g * (1 - cosine))[:, None] * by_length
+    mass = problem.scene.pendulum.mass_kg
+    if mass is None:
+        return found
+    depth = values.get("length", g / omega_g**2)
     return replace(
         found,
-        tension_n=tension,
-        sigma_tension_n=spread(d_tension),
-        energy_j=energy,
-        sigma_energy_j=spread(d_energy),
+        tension_n=mass * g * tension,
+        sigma_tension_n=mass * g * found.sigma_tension,
+        energy_j=mass * g * depth * energy,
+        sigma_energy_j=mass * g * depth * spread(d_energy - 2 * energy[:, None] * by_omega_g / omega_g),
     )
 
 

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import PendulabError
-from toolkit.fit import FitResult
 from toolkit.report.document import Paragraph, Section, Table
 from toolkit.report.material import DRAGS, Material, parameter
 from toolkit.report.numbers import bare, number, with_uncertainty
 from toolkit.report.speech import symbol
 
+if TYPE_CHECKING:
+    from toolkit.fitting.budget import Row
+
 _CLOCK_HALF_WIDTH = 50e-6
-
-
 _G_HALF_WIDTH = 0.026
-
-
 _BY_CLOCK = {
     "T0": 1.0,
     "g_from_length": -2.0,
@@ -32,28 +31,56 @@ _BY_CLOCK = {
 """Power of the unit of time in each quantity: how a relative error of the clock passes into it."""
 
 
-def budget_section(material: Material) -> Section | None:
-    """GUM budgets of the drag coefficients, of T₀, of the length and of g, as far as they were found."""
-    words, result = material.words, material.full_sine if material.full_sine.success else material.best
-    names = [n for n in DRAGS if (p := parameter(result, n)) is not None and p.stderr and p.value > p.stderr]
-    names += [n for n in ("T0", "equivalent_length", "g_from_length") if parameter(result, n) is not None]
-    tables = [table for name in names if (table := _table(material, result, name)) is not None]
-    if not tables:
-        return None
-    return Section("budget", words("section.budget"), (Paragraph(words("text.budget")), *tables))
+@dataclass(frozen=True)
+class Summed:
+    """One quantity's sources of uncertainty (the fit's own and those assumed here) and what they add up to."""
+
+    estimate: float
+    unit: str
+    rows: tuple[Row, ...]
+
+    @property
+    def statistical(self) -> float:
+        """Root sum of squares of the sources of type A."""
+        return math.sqrt(sum(r.contribution**2 for r in self.rows if r.kind == "A"))
+
+    @property
+    def systematic(self) -> float:
+        """Root sum of squares of the sources of type B."""
+        return math.sqrt(sum(r.contribution**2 for r in self.rows if r.kind == "B"))
+
+    @property
+    def u(self) -> float:
+        """Combined standard uncertainty."""
+        return math.hypot(self.statistical, self.systematic)
+
+    @property
+    def coverage_factor(self) -> float:
+        """Student's quantile for 95 % at the effective degrees of freedom (Welch and Satterthwaite)."""
+        from scipy.special import stdtrit
+
+        fourth = sum(r.contribution**4 / r.dof for r in self.rows if r.dof > 0)
+        return float(stdtrit(min(self.u**4 / fourth if fourth > 0 else math.inf, 1e9), 0.975))
 
 
-def _table(material: Material, result: FitResult, name: str) -> Table | None:
-    from scipy.stats import t as student
-
+def summed(material: Material, name: str) -> Summed | None:
+    """The budget of a quantity of the full-sine fit; None for one that the fit did not find, or not above its error."""
     from toolkit.fitting.budget import Row, budget
 
-    words, environment = material.words, material.analysis.scene.environment
+    result, environment = material.full_sine, material.analysis.scene.environment
+    found = result.parameters.get(name) if name in DRAGS else parameter(result, name)
+    if (
+        name not in _BY_CLOCK
+        or found is None
+        or not result.success
+        or (name in DRAGS and not (found.stderr and found.value > found.stderr))
+    ):
+        return None
     try:
         drawn = budget(result, name)
     except PendulabError:
         return None
-    rows = list(drawn.rows)
+    rows = [row for row in drawn.rows if row.contribution]
     assumed = [("time_scale", "1", 1.0, _CLOCK_HALF_WIDTH, _BY_CLOCK[name] * drawn.estimate)]
     if name == "equivalent_length" and environment.g_m_per_s2 is None and environment.latitude_deg is None:
         g = environment.gravity_m_per_s2
@@ -62,11 +89,21 @@ def _table(material: Material, result: FitResult, name: str) -> Table | None:
         u = half / math.sqrt(3)
         if sensitivity and all(row.quantity != source for row in rows):
             rows.append(Row(source, estimate, unit, u, "B", "rectangular", sensitivity, sensitivity * u, math.inf))
-    statistical = math.sqrt(sum(r.contribution**2 for r in rows if r.kind == "A"))
-    systematic = math.sqrt(sum(r.contribution**2 for r in rows if r.kind == "B"))
-    total = math.hypot(statistical, systematic)
-    fourth = sum(r.contribution**4 / r.dof for r in rows if r.dof > 0)
-    factor = float(student.ppf(0.975, min(total**4 / fourth if fourth > 0 else math.inf, 1e9)))
+    return Summed(drawn.estimate, drawn.unit, tuple(rows))
+
+
+def budget_section(material: Material) -> Section | None:
+    """GUM budgets of the drag coefficients, of T₀, of the length and of g, as far as they were found."""
+    words = material.words
+    names = (*DRAGS, "T0", "equivalent_length", "g_from_length")
+    tables = [_table(material, name, found) for name in names if (found := summed(material, name)) is not None]
+    if not tables:
+        return None
+    return Section("budget", words("section.budget"), (Paragraph(words("text.budget")), *tables))
+
+
+def _table(material: Material, name: str, found: Summed) -> Table:
+    words, factor = material.words, found.coverage_factor
     lines = [
         (
             words.either(f"budget.{row.quantity}", row.quantity),
@@ -75,12 +112,16 @@ def _table(material: Material, result: FitResult, name: str) -> Table | None:
             row.kind,
             words(f"budget.{row.distribution}"),
             number(row.sensitivity, 3),
-            with_uncertainty(abs(row.contribution), None, drawn.unit, 2),
+            with_uncertainty(abs(row.contribution), None, found.unit, 2),
         )
-        for row in rows
+        for row in found.rows
     ]
-    for key, part in (("statistical_total", statistical), ("systematic_total", systematic), ("total", total)):
-        lines.append((words(f"budget.{key}"), "", "", "", "", "", with_uncertainty(part, None, drawn.unit, 2)))
+    for key, part in (
+        ("statistical_total", found.statistical),
+        ("systematic_total", found.systematic),
+        ("total", found.u),
+    ):
+        lines.append((words(f"budget.{key}"), "", "", "", "", "", with_uncertainty(part, None, found.unit, 2)))
     header = tuple(
         words(f"column.{c}")
         for c in ("source", "value", "uncertainty", "kind", "distribution", "sensitivity", "contribution")
@@ -88,8 +129,8 @@ def _table(material: Material, result: FitResult, name: str) -> Table | None:
     caption = words(
         "budget.title",
         quantity=symbol(words, name),
-        value=with_uncertainty(drawn.estimate, total, drawn.unit),
-        expanded=with_uncertainty(factor * total, None, drawn.unit, 2),
+        value=with_uncertainty(found.estimate, found.u, found.unit),
+        expanded=with_uncertainty(factor * found.u, None, found.unit, 2),
         k=number(factor, 3),
     )
     return Table(f"budget_{name}", caption, header, tuple(lines), len(lines) - 1)

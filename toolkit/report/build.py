@@ -44,5 +44,6 @@ def build(analysis: Analysis, lang: str) -> Report:
         sections=tuple(s for s in sections if s is not None),
         footer=words("page.footer", version=__version__),
         words=words,
+        cautions=essentials.cautions(material),
         sheets=sheets(material),
     )

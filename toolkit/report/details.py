@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.fit import FitResult
 from toolkit.report.document import Block, Equation, Paragraph, Section, Table
-from toolkit.report.essentials import MAIN, card, drag_answer
+from toolkit.report.essentials import MAIN, card, drag_answer, notes
 from toolkit.report.material import PAPER, Material
 from toolkit.report.numbers import number, percent, with_uncertainty
 from toolkit.report.speech import model_name, say_whole, solver, symbol
@@ -176,9 +176,9 @@ def methods(material: Material) -> Section:
     words, meta = material.words, material.analysis.series.meta
     log = tuple(say_whole(words, line) for line in meta.get("log", ()))
     blocks: list[Block] = [Paragraph("" if log else words("text.no_log"), log)]
-    notes = [say_whole(words, line) for line in (*meta.get("warnings", ()), *material.best.warnings)]
-    if notes:
-        blocks.append(Paragraph(words("text.warnings"), tuple(dict.fromkeys(notes))))
+    noted = notes(material)
+    if noted:
+        blocks.append(Paragraph(words("text.warnings"), tuple(noted)))
     return Section("methods", words("section.methods"), tuple(blocks))
 
 

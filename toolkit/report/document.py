@@ -98,7 +98,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Report:
-    """All of a report. `sheets` (name -> column -> values) are numbers for a spreadsheet."""
+    """All of a report. `cautions` are what a reader of the first page must know. `sheets` (name -> column -> values) are numbers for a spreadsheet."""
 
     title: str
     subtitle: str
@@ -108,6 +108,7 @@ class Report:
     sections: tuple[Section, ...]
     footer: str
     words: Words
+    cautions: tuple[str, ...] = ()
     sheets: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property

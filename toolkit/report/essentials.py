@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.report.budgets import summed
 from toolkit.report.document import Fact, Figure, Verdict
 from toolkit.report.material import DRAGS, Material, parameter
 from toolkit.report.numbers import number, percent, with_uncertainty
-from toolkit.report.speech import assumption, model_name, remedy, say, sentence, symbol
+from toolkit.report.speech import assumption, model_name, remedy, say, say_whole, sentence, symbol
 from toolkit.report.words import Words
 
 if TYPE_CHECKING:
     from toolkit.checks.finding import Finding
-    from toolkit.fit import FitResult
+    from toolkit.fit import FitResult, FittedParameter
 
 MAIN = ("small_angle", "linear_drag")
 
@@ -28,7 +29,7 @@ def lead(material: Material) -> str:
     if cycles is None:
         text = words("page.lead_few", first=number(math.degrees(widest), 3), **common)
     else:
-        ends = cycles.amplitude_rad[0], cycles.amplitude_rad[-1]
+        ends = material.ends
         first, last = (number(math.degrees(a), 3) for a in ends)
         swings = round(series.duration_s / float(np.median(cycles.period_s)))
         fell = "page.lead" if ends[1] < 0.97 * ends[0] else "page.lead_steady"
@@ -62,21 +63,21 @@ def facts(material: Material) -> tuple[Fact, ...]:
             found.append(Fact(words(f"question.{name}"), _short_answer(material, finding), _theory(words, finding)))
     period = parameter(material.full_sine, "T0")
     if period is not None:
-        shown = with_uncertainty(period.value, period.stderr, "s")
-        found.append(
-            Fact(words("question.period"), f"{symbol(words, 'T0')} = {shown}", _mean_period(material, period.value))
-        )
+        shown = with_uncertainty(period.value, _u(material, "T0", period), "s")
+        found.append(Fact(words("question.period"), f"{symbol(words, 'T0')} = {shown}", _mean_period(material, period)))
     g = scene.environment.gravity_m_per_s2
     for name in ("length", "equivalent_length"):
         length = parameter(material.full_sine, name)
         if length is not None:
             given = name == "length" and length.fixed
             remark = words("answer.given_length") if given else words("answer.equivalent", g=number(g, 6))
-            found.append(Fact(words("question.length"), with_uncertainty(length.value, length.stderr, "m"), remark))
+            shown = with_uncertainty(length.value, _u(material, name, length), "m")
+            found.append(Fact(words("question.length"), shown, remark))
             break
     gravity = parameter(material.full_sine, "g_from_length")
     if gravity is not None:
-        found.append(Fact(words("question.g"), f"g = {with_uncertainty(gravity.value, gravity.stderr, 'm/s²')}"))
+        shown = with_uncertainty(gravity.value, _u(material, "g_from_length", gravity), "m/s²")
+        found.append(Fact(words("question.g"), f"g = {shown}"))
     return tuple(found)
 
 
@@ -89,14 +90,16 @@ def _without_mass(words: Words, result: FitResult) -> str:
     return words("answer.no_mass", per_gram=per_gram)
 
 
-def _mean_period(material: Material, small_s: float) -> str:
-    """What a stopwatch would give: the median of the measured periods, with the amplitude it belongs to."""
+def _mean_period(material: Material, small: FittedParameter) -> str:
+    """Where the period is from, and what a stopwatch would give: the median of those measured, with its amplitude."""
+    origin = material.words("answer.from_fit" if small.stderr else "answer.from_length")
     if material.cycles is None:
-        return ""
+        return origin
     angle = math.degrees(float(np.median(material.cycles.amplitude_rad)))
     longer = float(np.median(material.cycles.period_s))
-    share = percent(longer / small_s - 1)
-    return material.words("answer.mean_period", angle=number(angle, 3), period=number(longer, 5), percent=share)
+    share = percent(longer / small.value - 1)
+    swings = material.words("answer.mean_period", angle=number(angle, 3), period=number(longer, 5), percent=share)
+    return f"{origin}; {swings}"
 
 
 def drag_answer(material: Material, result: FitResult) -> str:
@@ -111,8 +114,15 @@ def drag_answer(material: Material, result: FitResult) -> str:
             unit = with_uncertainty(1.0, None, found.unit)[1:].strip()
             parts.append(words("answer.zero_drag", symbol=symbol(words, name), bound=f"{bound} {unit}".strip()))
         else:
-            parts.append(f"{symbol(words, name)} = {with_uncertainty(found.value, found.stderr, found.unit)}")
+            u = _u(material, name, found) if result is material.full_sine else found.stderr
+            parts.append(f"{symbol(words, name)} = {with_uncertainty(found.value, u, found.unit)}")
     return "; ".join(parts) or "–"
+
+
+def _u(material: Material, name: str, found: FittedParameter) -> float | None:
+    """The combined standard uncertainty of the budget, else that of the fit."""
+    drawn = summed(material, name)
+    return drawn.u if drawn is not None and drawn.u > 0 else found.stderr
 
 
 def _sure(material: Material, result: FitResult) -> str:
@@ -120,7 +130,8 @@ def _sure(material: Material, result: FitResult) -> str:
     for name in DRAGS:
         found = result.parameters.get(name)
         if found is not None and found.stderr and found.value > found.stderr:
-            parts.append(words("answer.sure", symbol=symbol(words, name), percent=percent(found.stderr / found.value)))
+            u = (_u(material, name, found) if result is material.full_sine else found.stderr) or found.stderr
+            parts.append(words("answer.sure", symbol=symbol(words, name), percent=percent(u / found.value)))
     return ", ".join(parts) or "–"
 
 
@@ -174,6 +185,26 @@ def verdicts(material: Material) -> tuple[Verdict, ...]:
         if finding is not None:
             cards.append(card(material.words, finding, pictures[name](material)))
     return tuple(cards)
+
+
+def cautions(material: Material) -> tuple[str, ...]:
+    """What the numbers of the first page leave out: failed checks of the record and what was noted about it, three at most.
+
+    Correlated residuals are not among them: the error bars allow for them, as the answers say.
+    """
+    words, analysis = material.words, material.analysis
+    failed = [
+        f"**{assumption(words, f)}**: {sentence(words, f)}"
+        for f in analysis.findings
+        if f.verdict == "fails" and f.assumption not in (*MAIN, "white_residuals")
+    ]
+    return tuple(failed + notes(material))[:3]
+
+
+def notes(material: Material) -> list[str]:
+    """What was noted about the record and about the preferred fit."""
+    told = (*material.analysis.series.meta.get("warnings", ()), *material.best.warnings)
+    return list(dict.fromkeys(say_whole(material.words, line) for line in told))
 
 
 def card(words: Words, finding: Finding, figure: Figure | None) -> Verdict:

@@ -9,6 +9,7 @@ from typing import Any
 
 from toolkit.report.document import Report, Table
 from toolkit.report.numbers import bare, rich
+from toolkit.report.paper import lines, width_percent
 from toolkit.report.style import with_css_colours
 
 
@@ -42,6 +43,8 @@ def render(report: Report) -> str:
         inline=inline,
         kind_of=lambda block: type(block).__name__,
         number_of=numbering(report),
+        lines=lines,
+        width_of=width_percent,
     )
 
 
@@ -65,6 +68,6 @@ def font_face() -> str:
         data = (files("toolkit.report") / "fonts" / f"NotoSansThai-{name}.ttf").read_bytes()
         url = f"data:font/ttf;base64,{base64.b64encode(data).decode('ascii')}"
         faces.append(
-            f'@font-face{{font-family:"Noto Sans Thai";font-weight:{weight};src:url({url}) format("truetype")}}\n'
+            f'@font-face{{font-family:"Noto Sans Thai";font-weight:{weight};src:url({url}) format("truetype");unicode-range:U+0-2211,U+2213-FFFF}}\n'
         )
     return "".join(faces)

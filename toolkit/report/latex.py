@@ -7,7 +7,7 @@ from pathlib import Path
 from toolkit.report.document import Block, Equation, Figure, Report, Table
 from toolkit.report.figure_files import write_figures
 from toolkit.report.numbers import bare, rich
-from toolkit.report.paper import width_percent
+from toolkit.report.paper import lines, width_percent
 
 _SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -93,18 +93,29 @@ def render(report: Report) -> str:
         title = f"\\paragraph{{{_text(verdict.title)}: {_text(verdict.label)}.}}"
         parts += [f"{title} {_text(verdict.sentence)} {_text(verdict.remedy)}", ""]
         if verdict.figure:
-            parts.append(_block(verdict.figure))
+            parts.append(_figures([verdict.figure]))
+    if report.cautions:
+        parts += [f"\\paragraph{{{_text(words('page.cautions'))}.}}", " ".join(map(_text, report.cautions)), ""]
     for section in report.sections:
         parts.append(f"\\subsection*{{{_text(section.title)}}}")
-        parts += [_block(block) for block in section.blocks]
+        parts += [_figures(row) if isinstance(row[0], Figure) else _block(row[0]) for row in lines(section.blocks)]
     return "\n".join([*parts, _text(report.footer), r"\par\endgroup", ""])
 
 
+def _figures(row: list[Figure]) -> str:
+    """One floating figure, or several side by side."""
+    pictures = []
+    for figure in row:
+        caption = f"\\caption{{{_text(figure.caption)}}}\\label{{fig:{figure.key}}}"
+        width = width_percent(figure) / 100
+        inner = "" if len(row) == 1 else f"\\begin{{minipage}}[t]{{{0.98 * width:.3f}\\linewidth}}"
+        shown = f"{width:.3f}\\linewidth" if len(row) == 1 else "\\linewidth"
+        picture = f"\\includegraphics[width={shown}]{{figures/{figure.key}}}\n{caption}"
+        pictures.append(inner + picture + ("\\end{minipage}" if inner else ""))
+    return "\\begin{figure}[htbp]\\centering " + "\\hfill\n".join(pictures) + "\\end{figure}\n"
+
+
 def _block(block: Block) -> str:
-    if isinstance(block, Figure):
-        width = 0.5 if block.key in ("period", "decay") else width_percent(block) / 100
-        picture = f"\\includegraphics[width={width:.2f}\\linewidth]{{figures/{block.key}}}"
-        return f"\\begin{{figure}}[htbp]\\centering {picture}\n\\caption{{{_text(block.caption)}}}\\label{{fig:{block.key}}}\\end{{figure}}\n"
     if isinstance(block, Equation):
         return f"\\begin{{equation}}\n{block.latex}\n\\end{{equation}}\n"
     if isinstance(block, Table):

@@ -32,6 +32,8 @@ def render(report: Report) -> str:
         )
         if verdict.figure:
             parts.append(_block(verdict.figure))
+    if report.cautions:
+        parts += [f"### {_text(words('page.cautions'))}", "\n".join(f"- {_text(line)}" for line in report.cautions)]
     for section in report.sections:
         parts.append(f"## {_text(section.title)}")
         parts += [_block(block) for block in section.blocks]

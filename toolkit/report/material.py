@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -105,6 +105,17 @@ class Material:
         return found if found.t_s.size >= 3 else None
 
     @cached_property
+    def ends(self) -> tuple[float, float]:
+        """Amplitude at the record's start and end, rad: the model's, else that of the first and last swing."""
+        from toolkit.fitting.cycles import amplitude_of
+
+        if self.usable and np.all(np.isfinite(envelope := amplitude_of(self.best))):
+            scale = 1 + (value(self.best, "angle_scale") or 0.0)  # as the camera sees it
+            return scale * float(envelope[0]), scale * float(envelope[-1])
+        assert self.cycles is not None
+        return float(self.cycles.amplitude_rad[0]), float(self.cycles.amplitude_rad[-1])
+
+    @cached_property
     def sigma(self) -> float:
         """Scatter of a point about the preferred model, rad."""
         sigma = self.best.noise.get("sigma_rad")
@@ -125,39 +136,23 @@ class Material:
 
     def curve(self, result: FitResult, t_s: np.ndarray) -> Curve:
         """The model of `result` at `t_s` with the band that its covariance gives."""
-        values = {name: p.value for name, p in result.parameters.items()}
+        from toolkit.fitting.uncertainty import bands
+
         problem = self.problem(result)
         if problem is None:
             at = np.clip(np.searchsorted(self.t, t_s), 0, self.t.size - 1)
             theta, omega = result.theta_rad[at], result.omega_rad_per_s[at]
-            tension, energy = self._tension(theta, omega), self._energy(theta, omega)
+            tension = np.cos(theta - self.offset) + (omega / self.omega_g) ** 2
+            energy = (omega / self.omega_g) ** 2 / 2 + 1 - np.cos(theta - self.offset)
             return Curve(self.t[at], theta, omega, tension, energy, None, None, None, None)
-        names = tuple(result.free)
-        motion = problem.motion(values, t_s - problem.shift_s, names)
-        scale = 1 + values.get("angle_scale", 0.0)
-        d_theta, d_omega = motion.d_theta.copy(), motion.d_omega
-        d_tension = -np.sin(motion.theta)[:, None] * d_theta + 2 * (motion.omega / self.omega_g**2)[:, None] * d_omega
-        d_energy = np.sin(motion.theta)[:, None] * d_theta + (motion.omega / self.omega_g**2)[:, None] * d_omega
-        if "theta_offset" in names:
-            d_theta[:, names.index("theta_offset")] += 1.0
-        covariance = np.asarray(result.covariance, dtype=float)
-        known = covariance.shape == (len(names), len(names)) and np.all(np.isfinite(covariance))
-
-        def band(by: np.ndarray) -> np.ndarray | None:
-            return np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", by, covariance, by), 0)) if known else None
-
-        theta = scale * motion.theta + values.get("theta_offset", 0.0)
-        tension, energy = self._tension(motion.theta, motion.omega), self._energy(motion.theta, motion.omega)
-        bands = (band(by) for by in (d_theta, d_omega, d_tension, d_energy))
-        return Curve(t_s, theta, motion.omega, tension, energy, *bands)
-
-    def _tension(self, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
-        """Tension of the string over the bob's weight: cos θ + θ̇²/ω_g²."""
-        return np.cos(theta) + (omega / self.omega_g) ** 2
-
-    def _energy(self, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
-        """Energy over m g ℓ: θ̇²/(2 ω_g²) + 1 − cos θ."""
-        return (omega / self.omega_g) ** 2 / 2 + 1 - np.cos(theta)
+        covariance, k = np.asarray(result.covariance, dtype=float), len(result.free)
+        known = covariance.shape == (k, k) and bool(np.all(np.isfinite(covariance)))
+        found = bands(replace(result, problem=problem, covariance=covariance if known else np.zeros((k, k))), t_s)
+        values = found.theta_rad, found.omega_rad_per_s, found.tension, found.energy
+        if not known:
+            return Curve(t_s, *values, None, None, None, None)
+        sigmas = found.sigma_theta_rad, found.sigma_omega_rad_per_s, found.sigma_tension, found.sigma_energy
+        return Curve(t_s, *values, *sigmas)
 
     @cached_property
     def reduced(self) -> dict[str, float]:

@@ -12,7 +12,7 @@ from typing import Any
 from toolkit.report.document import Block, Equation, Figure, Report, Table
 from toolkit.report.html import numbering
 from toolkit.report.numbers import bare, rich
-from toolkit.report.paper import column_kinds, width_percent
+from toolkit.report.paper import column_kinds, lines, width_percent
 
 
 def write(report: Report, folder: Path) -> Path:
@@ -79,6 +79,9 @@ def _content(report: Report, root: Path) -> dict[str, Any]:
             }
         return {"kind": "text", "text": rich(item.text), "items": [rich(line) for line in item.items]}
 
+    def side_by_side(row: list[Block]) -> dict[str, Any]:
+        return {"kind": "row", "figures": [picture(item) for item in row if isinstance(item, Figure)]}
+
     return {
         "lang": words.lang,
         "fonts": ["Noto Sans Thai", "Libertinus Serif"] if thai else ["Libertinus Serif", "Noto Sans Thai"],
@@ -105,6 +108,14 @@ def _content(report: Report, root: Path) -> dict[str, Any]:
             }
             for v in report.verdicts
         ],
-        "sections": [{"title": s.title, "blocks": [block(b) for b in s.blocks]} for s in report.sections],
+        "cautions_word": words("page.cautions"),
+        "cautions": [rich(line) for line in report.cautions],
+        "sections": [
+            {
+                "title": s.title,
+                "blocks": [block(row[0]) if len(row) == 1 else side_by_side(row) for row in lines(s.blocks)],
+            }
+            for s in report.sections
+        ],
         "footer": rich(report.footer),
     }

@@ -102,6 +102,10 @@ _SHARES = frozenset(
 )
 
 
+_ABOUT = frozenset(["amplitude_above_rad", "amplitude_below_rad", "amplitude_visible_rad"])
+"""Limits that are told as `about`, with two digits."""
+
+
 def _shown(values: Any) -> dict[str, str]:
     """words_values as texts: `…_rad` also as `…_deg` and `…_mrad`, shares also as `…_percent`."""
     shown: dict[str, str] = {}
@@ -111,7 +115,8 @@ def _shown(values: Any) -> dict[str, str]:
             continue
         shown[key] = number(float(found), 3)
         if key.endswith("_rad"):
-            shown[key.removesuffix("_rad") + "_deg"] = number(math.degrees(found), 3)
+            digits = 2 if key in _ABOUT else 3
+            shown[key.removesuffix("_rad") + "_deg"] = number(math.degrees(found), digits)
             shown[key.removesuffix("_rad") + "_mrad"] = number(1e3 * found, 2)
         if key.endswith("_s"):
             shown[key.removesuffix("_s") + "_ms"] = number(1e3 * found, 2)

@@ -27,9 +27,13 @@ def draw(key: str, lang: str, height_in: float, paint: Callable[[Any], None], wi
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
+    from toolkit.report.ticks import draw_ticks
+
     with matplotlib.rc_context({**_RC, "svg.hashsalt": key, "font.family": _fonts(lang)}):
         figure = Figure(figsize=(width_in, height_in))
         paint(figure)
+        for axes in figure.axes:
+            draw_ticks(axes)
         buffer = io.StringIO()
         FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
     return _tidy(buffer.getvalue())
@@ -128,6 +132,7 @@ def with_css_colours(svg: str) -> str:
 
 
 def _fonts(lang: str) -> list[str]:
+    """DejaVu for letters, digits and a minus as long as a plus, then the Thai font."""
     if lang != "th":
         return ["DejaVu Sans"]
     from matplotlib import font_manager
@@ -137,7 +142,7 @@ def _fonts(lang: str) -> list[str]:
         for font in (files("toolkit.report") / "fonts").iterdir():
             if font.name.endswith(".ttf"):
                 font_manager.fontManager.addfont(str(font))
-    return [family, "DejaVu Sans"]
+    return ["DejaVu Sans", family]
 
 
 _RC: dict[str, Any] = {
@@ -147,6 +152,7 @@ _RC: dict[str, Any] = {
     "axes.titlesize": 9,
     "axes.titleweight": "regular",
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,
     "legend.fontsize": 7.8,
     "legend.frameon": False,
     "legend.handlelength": 1.6,
@@ -181,6 +187,12 @@ _RC: dict[str, Any] = {
     "path.simplify": True,
     "path.simplify_threshold": 0.4,
 }
+
+
+def legend_above(axis: Any, columns: int = 4) -> None:
+    """The legend on the axes' upper edge, where no data can be."""
+    look = {"borderaxespad": 0.2, "columnspacing": 0.9, "handlelength": 1.1, "handletextpad": 0.5, "labelspacing": 0.2}
+    axis.legend(loc="lower left", bbox_to_anchor=(-0.02, 1), ncols=columns, **look)
 
 
 def dots(

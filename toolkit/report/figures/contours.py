@@ -23,7 +23,7 @@ def contours(material: Material) -> Figure | None:
     fits = [r for r in material.analysis.fits.values() if r.success and _covariance(r) is not None and len(r.free) >= 2]
     if not fits:
         return None
-    result = max(fits, key=lambda r: (sum(n in DRAGS for n in r.free), r is material.best))
+    result = max(fits, key=lambda r: (min(2, sum(n in DRAGS for n in r.free)), -r.aic))
     if (
         result is not material.best
         and _covariance(material.best) is not None
@@ -46,16 +46,23 @@ def contours(material: Material) -> Figure | None:
     profiled = _profile(material, result, result.free[first], result.free[second])
 
     def paint(figure: Any) -> None:
-        left, right = panels(figure, 1, 2, left=0.85, gap=0.8, bottom=0.62, width_ratios=(1.15, 1))
+        left, right = panels(figure, 1, 2, left=0.85, gap=0.8, width_ratios=(1.15, 1))
         if profiled is not None:
             x, y = profiled.first / 10.0 ** powers[first], profiled.second / 10.0 ** powers[second]
-            left.contour(x, y, profiled.delta_chi2, levels=_LEVELS, colors=[PAPER_MODEL], linewidths=[1.1, 0.8])
-        turn = np.linspace(0, 2 * np.pi, 181)
+            left.contour(
+                *map(_smooth, (x, y, profiled.delta_chi2)), levels=_LEVELS, colors=[PAPER_MODEL], linewidths=[1.1, 0.8]
+            )
+        turn = np.linspace(0, 2 * np.pi, 4001)  # so many that a needle has points on its tip
         root = np.linalg.cholesky(scaled[np.ix_([first, second], [first, second])])
-        for k, alpha in ((math.sqrt(_LEVELS[1]), 0.18), (math.sqrt(_LEVELS[0]), 0.35)):
-            x, y = k * root @ np.vstack([np.cos(turn), np.sin(turn)])
-            left.fill(values[first] + x, values[second] + y, color=BEST_MODEL, alpha=alpha, linewidth=0)
+        for k, alpha in ((math.sqrt(_LEVELS[0]), 0.35), (math.sqrt(_LEVELS[1]), 0.18)):
+            x, y = values[[first, second]][:, None] + k * root @ np.vstack([np.cos(turn), np.sin(turn)])
+            left.fill(x, y, color=BEST_MODEL, alpha=alpha, linewidth=0)
         left.plot(values[first], values[second], "+", color=INK, markersize=6)
+        possible = (x >= 0) | (result.free[first] not in DRAGS)  # a drag is not negative
+        possible &= (y >= 0) | (result.free[second] not in DRAGS)
+        for name, line, limits in ((result.free[first], x, left.set_xlim), (result.free[second], y, left.set_ylim)):
+            if name in DRAGS and not possible.all() and possible.any():
+                limits(max(limits()[0], 0.0), 1.1 * float(line[possible].max()))
         left.set_xlabel(f"{labels[first]} {units[first]}")
         left.set_ylabel(f"{labels[second]} {units[second]}")
         left.ticklabel_format(useOffset=False)
@@ -63,10 +70,9 @@ def contours(material: Material) -> Figure | None:
         right.imshow(np.abs(correlation), cmap="Greys", vmin=0, vmax=1.6, aspect="auto")
         for i in range(len(labels)):
             for j in range(len(labels)):
-                right.text(
-                    j, i, f"{correlation[i, j]:.2f}".replace("-", "−"), ha="center", va="center", fontsize=7, color=INK
-                )
-        right.set_xticks(range(len(labels)), labels, rotation=35, ha="right")
+                shown = f"{correlation[i, j] + 0.0:z.2f}".replace("-", "−")
+                right.text(j, i, shown, ha="center", va="center", fontsize=7 if len(labels) < 7 else 6, color=INK)
+        right.set_xticks(range(len(labels)), labels)
         right.set_yticks(range(len(labels)), labels)
         for side in right.spines.values():
             side.set_visible(False)
@@ -80,7 +86,7 @@ def contours(material: Material) -> Figure | None:
         data["delta_chi2"] = profiled.delta_chi2.ravel()
     key = "caption.contours" if profiled is None else "caption.contours_profile"
     model = words.either(f"model.{result.model}", result.model)
-    return Figure("contours", words(key, model=model), draw("contours", "en", 2.7, paint), data)
+    return Figure("contours", words(key, model=model), draw("contours", "en", 2.5, paint), data)
 
 
 def _profile(material: Material, result: Any, first: str, second: str) -> Contour | None:
@@ -91,6 +97,19 @@ def _profile(material: Material, result: Any, first: str, second: str) -> Contou
         return None
     found = contour(result, first, second, reach=3.0, count=13)
     return found if np.isfinite(found.delta_chi2).mean() > 0.5 else None
+
+
+def _smooth(net: np.ndarray, times: int = 4) -> np.ndarray:
+    """The net made `times` finer along both axes by cubics through its places (Catmull and Rom), so that lines are round."""
+    for _ in range(2):
+        net = np.vstack([2 * net[:1] - net[1:2], net, 2 * net[-1:] - net[-2:-1]])
+        a, b, c, d = net[:-3], net[1:-2], net[2:-1], net[3:]
+        finer = [
+            b + 0.5 * u * (c - a + u * (2 * a - 5 * b + 4 * c - d + u * (3 * (b - c) + d - a)))
+            for u in np.arange(times) / times
+        ]
+        net = np.vstack([np.stack(finer, axis=1).reshape(-1, net.shape[1]), net[-2:-1]]).T
+    return net
 
 
 def _covariance(result: Any) -> np.ndarray | None:

@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.fitting.cycles import Cycles, amplitude_of
 from toolkit.report.document import Figure
 from toolkit.report.material import Material, value
-from toolkit.report.style import BEST_MODEL, DATA, PAPER_MODEL, dots, draw, panels
+from toolkit.report.style import BEST_MODEL, DATA, PAPER_MODEL, dots, draw, legend_above, panels
 
 _LAWS = (("full_linear_drag", "linear", PAPER_MODEL, "-"), ("full_quadratic_drag", "quadratic", BEST_MODEL, "--"))
 
@@ -28,7 +28,11 @@ def decay(material: Material, width_in: float = 3.35, height_in: float = 2.85) -
     degrees = np.degrees(cycles.amplitude_rad)
 
     def paint(figure: Any) -> None:
-        top, rest = panels(figure, 2, sharex=True, height_ratios=(2.2, 1)) if laws else (panels(figure), None)
+        top, rest = (
+            panels(figure, 2, top=0.24, sharex=True, height_ratios=(2.2, 1))
+            if laws
+            else (panels(figure, top=0.24), None)
+        )
         dots(top, cycles.t_s, degrees, DATA, 2.2 if degrees.size > 60 else 4.0, 1.0, words("figure.measured"))
         for name, (law, colour, dash) in laws.items():
             top.plot(cycles.t_s, np.degrees(law), dash, color=colour, label=words(f"figure.law_{name}"))
@@ -37,8 +41,8 @@ def decay(material: Material, width_in: float = 3.35, height_in: float = 2.85) -
             top.set_yscale("log")
             plain_log(top)
         low, high = np.log(degrees.min()), np.log(degrees.max())
-        top.set_ylim(np.exp(low - 0.06 * (high - low)), np.exp(high + 0.45 * (high - low)))  # room for the legend
-        top.legend(loc="upper right", borderaxespad=0, labelspacing=0.25)
+        top.set_ylim(np.exp(low - 0.06 * (high - low)), np.exp(high + 0.08 * (high - low)))
+        legend_above(top, 3)
         if rest is None:
             top.set_xlabel(words("figure.time_s"))
             return
@@ -62,10 +66,10 @@ def _envelope(material: Material, model: str, cycles: Cycles) -> np.ndarray | No
     return scale * np.interp(cycles.t_s, material.t, amplitude_of(result))
 
 
-def plain_log(axis: Any) -> None:
-    """Ticks 1, 2, 5 as plain numbers on a logarithmic y axis."""
+def plain_log(axis: Any, subs: tuple[int, ...] = (1, 2, 5)) -> None:
+    """Ticks at `subs` of each decade as plain numbers on a logarithmic y axis."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.yaxis.set_major_locator(LogLocator(subs=subs))
     axis.yaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.yaxis.set_minor_locator(NullLocator())

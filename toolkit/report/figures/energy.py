@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.report.document import Figure
 from toolkit.report.figures.decay import plain_log
 from toolkit.report.material import Material, value
-from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, THIRD, dots, draw, panels
+from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, THIRD, dots, draw, legend_above, panels
 
 _PARTS = (
     ("alpha_d", "loss_linear", BEST_MODEL),
@@ -39,7 +39,7 @@ def energy(material: Material) -> Figure | None:
 
     def paint(figure: Any) -> None:
         split = parts is not None and len(parts) > 1
-        axes = panels(figure, 1, 2 if split else 1, gap=0.72, left=0.62, top=0.28, squeeze=False)[0]
+        axes = panels(figure, 1, 2 if split else 1, gap=0.6, left=0.58, top=0.4, squeeze=False)[0]
         left = axes[0]
         dots(left, cycles.t_s, unit * measured, DATA, 2.4 if measured.size > 60 else 4.0, 1.0, words("figure.measured"))
         left.plot(t, unit * curve.energy, color=BEST_MODEL, label=words("figure.model"))
@@ -51,7 +51,7 @@ def energy(material: Material) -> Figure | None:
             plain_log(left)
         left.set_xlabel(words("figure.time_s"))
         left.set_ylabel(words(label))
-        left.legend(loc="upper right")
+        legend_above(left, 1 if split else 2)
         if split and parts is not None:
             _paint_loss(axes[1], words, parts, grouped)
 
@@ -63,7 +63,7 @@ def energy(material: Material) -> Figure | None:
         data |= {f"loss_{name}" if name != "amplitude_rad" else "loss_amplitude_rad": y for name, y in parts.items()}
     data |= dict(zip(("group_amplitude_rad", "group_loss", "u_group_loss"), grouped))
     key = "caption.energy" if parts is not None and len(parts) > 1 else "caption.energy_only"
-    return Figure("energy", words(key), draw("energy", words.lang, 2.5, paint), data)
+    return Figure("energy", words(key), draw("energy", words.lang, 2.4, paint, 4.5), data)
 
 
 def _unit(material: Material) -> tuple[float, str]:
@@ -127,9 +127,8 @@ def _paint_loss(axis: Any, words: Any, parts: Mapping[str, np.ndarray], grouped:
         color=INK,
         markersize=3.2,
         elinewidth=0.8,
-        label=words("figure.measured"),
     )
     axis.set_ylim(0, 1.1 * max(float(below.max()), float((100 * (loss + u)).max()) if loss.size else 0.0))
     axis.set_xlabel(words("figure.amplitude_deg"))
     axis.set_ylabel(words("figure.loss_percent"))
-    axis.legend(loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0, ncols=4, columnspacing=0.9, handlelength=1.0)
+    legend_above(axis, 2)

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.report.document import Figure
 from toolkit.report.material import Curve, Material
-from toolkit.report.style import BEST_MODEL, DATA, dots, draw, panels
+from toolkit.report.style import BEST_MODEL, DATA, dots, draw, legend_above, panels
 
 _PERIODS_ENLARGED = 4
 _COLUMNS = 700
@@ -41,7 +41,7 @@ def motion(material: Material) -> Figure | None:
     size = 2.2 if points.sum() > 200 else 4.0
 
     def paint(figure: Any) -> None:
-        axes = panels(figure, 3, 2 if whole else 1, squeeze=False, sharex="col")
+        axes = panels(figure, 3, 2 if whole else 1, top=0.24, squeeze=False, sharex="col")
         for row, (measured, label, scale) in enumerate(seen):
             axis = axes[row, -1]
             if measured is not None:
@@ -58,9 +58,7 @@ def motion(material: Material) -> Figure | None:
                     linewidth=0,
                 )
             if measured is not None and row == 0:
-                axis.legend(loc="upper right", ncols=2, borderaxespad=0)
-                low, high = axis.get_ylim()
-                axis.set_ylim(low, high + 0.22 * (high - low))
+                legend_above(axis)
             if whole:
                 _outline(axes[row, 0], t, long[row], DATA if row == 0 else BEST_MODEL)
             axes[row, 0].set_ylabel(label)
@@ -77,7 +75,7 @@ def motion(material: Material) -> Figure | None:
     return Figure(
         "motion",
         words("caption.motion" if whole else "caption.motion_short"),
-        draw("motion", words.lang, 3.7, paint),
+        draw("motion", words.lang, 4.0, paint),
         data,
     )
 

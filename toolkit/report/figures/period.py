@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.fitting.cycles import period_of
 from toolkit.report.document import Figure
 from toolkit.report.material import Material, binned, value
-from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, dots, draw, panels
+from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, dots, draw, legend_above, panels
 
 
 def period(material: Material, width_in: float = 3.35, height_in: float = 2.85) -> Figure | None:
@@ -26,7 +26,7 @@ def period(material: Material, width_in: float = 3.35, height_in: float = 2.85) 
     theory = period_of(grid, small)
 
     def paint(figure: Any) -> None:
-        axis = panels(figure)
+        axis = panels(figure, top=0.38)
         degrees = np.degrees(amplitude)
         many = degrees.size > 60
         if many:
@@ -45,12 +45,12 @@ def period(material: Material, width_in: float = 3.35, height_in: float = 2.85) 
             axis.axvspan(0, np.degrees(threshold), color=PAPER_MODEL, alpha=0.10, linewidth=0)
         low, high = np.percentile(cycles.period_s, [1, 99])
         low, high = min(low, small), max(high, float(theory[-1]))
-        axis.set_ylim(low - 0.08 * (high - low), high + 0.25 * (high - low))
+        axis.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
         axis.set_xlim(0, np.degrees(widest))
         axis.set_xlabel(words("figure.amplitude_deg"))
         axis.set_ylabel(words("figure.period_s"))
         axis.ticklabel_format(axis="y", useOffset=False)
-        axis.legend(loc="upper left")
+        legend_above(axis, 2)
 
     data = {"amplitude_rad": amplitude, "period_s": cycles.period_s}
     data["sigma_period_s"] = cycles.sigma_period_s

@@ -29,7 +29,9 @@ def residuals(material: Material) -> Figure | None:
     ]
 
     def paint(figure: Any) -> None:
-        axes = panels(figure, len(rows), 4, gap=0.2, between=0.3, top=0.25, sharey="row", sharex="col", squeeze=False)
+        axes = panels(
+            figure, len(rows), 4, left=0.68, gap=0.2, between=0.3, top=0.25, sharey="row", sharex="col", squeeze=False
+        )
         for line, (result, colour, name) in zip(axes, rows):
             rest = 1e3 * result.residuals_rad
             for axis, (x, _) in zip(line, against):
@@ -50,5 +52,5 @@ def residuals(material: Material) -> Figure | None:
         data["residual_paper_rad"] = paper.residuals_rad
     data["phase_rad"] = material.phase
     return Figure(
-        "residuals", words("caption.residuals"), draw("residuals", words.lang, 1.2 + 1.35 * len(rows), paint), data
+        "residuals", words("caption.residuals"), draw("residuals", words.lang, 0.85 + 1.15 * len(rows), paint), data
     )

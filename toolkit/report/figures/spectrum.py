@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from toolkit.report.document import Figure
+from toolkit.report.figures.decay import plain_log
 from toolkit.report.material import Material
-from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, draw, panels
+from toolkit.report.style import BEST_MODEL, DATA, INK, PAPER_MODEL, draw, legend_above, panels
 
 _LINES = 600
 
@@ -43,11 +44,11 @@ def spectrum(material: Material) -> Figure | None:
     shown = (frequency > 0) & (frequency <= min(0.5 / step, 8 * swing if math.isfinite(swing) else np.inf))
 
     def paint(figure: Any) -> None:
-        left, right = panels(figure, 1, 2, gap=0.62)
+        left, right = panels(figure, 1, 2, gap=0.62, top=0.24)
         for (_, colour, name), amplitude, correlation in zip(rows, spectra, correlations):
             f, a = _peaks(frequency[shown], 1e3 * amplitude[shown])
-            left.semilogy(f, np.maximum(a, 1e-6), color=colour, linewidth=0.7, label=name)
-            right.plot(step * np.arange(last), correlation[:last], color=colour, linewidth=0.9)
+            left.semilogy(f, np.maximum(a, 1e-6), color=colour, linewidth=0.7)
+            right.plot(step * np.arange(last), correlation[:last], color=colour, linewidth=0.9, label=name)
         for harmonic in (1, 3):
             if math.isfinite(swing) and harmonic * swing < frequency[shown][-1]:
                 left.axvline(harmonic * swing, color=DATA, linewidth=0.6, linestyle=":")
@@ -55,8 +56,9 @@ def spectrum(material: Material) -> Figure | None:
                     f"{harmonic}f" if harmonic > 1 else "f",
                     (harmonic * swing, 1),
                     xycoords=("data", "axes fraction"),
-                    xytext=(2, -8),
+                    xytext=(0, 2),
                     textcoords="offset points",
+                    ha="center",
                     color=INK,
                     fontsize=7.5,
                 )
@@ -64,7 +66,8 @@ def spectrum(material: Material) -> Figure | None:
         left.set_ylabel(words("figure.residual_amplitude_mrad"))
         low = float(np.percentile(1e3 * spectra[-1][shown], 5))
         left.set_ylim(bottom=max(low / 3, 1e-6))
-        left.legend(loc="upper right")
+        plain_log(left, (1,))
+        legend_above(right, 2)
         bound = 1.96 / math.sqrt(t.size)
         right.axhspan(-bound, bound, color=DATA, alpha=0.2, linewidth=0)
         right.set_xlabel(words("figure.lag_s"))
@@ -72,7 +75,7 @@ def spectrum(material: Material) -> Figure | None:
 
     data = {"frequency_hz": frequency}
     data |= {f"amplitude_{result.model}_rad": a for (result, _, _), a in zip(rows, spectra)}
-    return Figure("spectrum", words("caption.spectrum"), draw("spectrum", words.lang, 2.3, paint), data)
+    return Figure("spectrum", words("caption.spectrum"), draw("spectrum", words.lang, 2.2, paint), data)
 
 
 def _peaks(f: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
