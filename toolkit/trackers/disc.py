@@ -81,17 +81,17 @@ def _fit(
     string = 0.0, 0.0, 1.0
     if not isnan(guess.string_rad):
         string = cos(guess.string_rad), sin(guess.string_rad), cos(min(0.9, 0.2 + 3.0 / look.radius_px)) ** 2
-    desk.numbers[:_KNOWN] = (
+    desk.numbers[:_KNOWN] = [
         guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften,
         guess.streak_x_px, guess.streak_y_px, *string, look.noise, contrast,
-    )  # fmt: skip
+    ]  # fmt: skip
     image, back, seen = (
         p if p.strides[1] == 4 and p.dtype == np.float32 else np.ascontiguousarray(p, np.float32) for p in patch[:3]
     )
-    desk.places[:] = (
+    desk.places[:] = [
         _address(image), _address(back), _address(seen), desk.numbers_at, desk.room_at, rows, columns,
         image.strides[0] // 4, back.strides[0] // 4, seen.strides[0] // 4, free, look.even, turns, rows * columns, 0,
-    )  # fmt: skip
+    ]  # fmt: skip
     _kernel()(desk.at + 8 * (_PLACES - 1), None, desk.at)
     out = desk.numbers[_KNOWN:]
     return None if isnan(out[0]) else out
