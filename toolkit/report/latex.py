@@ -98,7 +98,9 @@ def render(report: Report) -> str:
         parts += [f"\\paragraph{{{_text(words('page.cautions'))}.}}", " ".join(map(_text, report.cautions)), ""]
     for section in report.sections:
         parts.append(f"\\subsection*{{{_text(section.title)}}}")
-        parts += [_figures(row) if isinstance(row[0], Figure) else _block(row[0]) for row in lines(section.blocks)]
+        for row in lines(section.blocks):
+            figures = [block for block in row if isinstance(block, Figure)]
+            parts.append(_figures(figures) if figures else _block(row[0]))
     return "\n".join([*parts, _text(report.footer), r"\par\endgroup", ""])
 
 
@@ -116,6 +118,8 @@ def _figures(row: list[Figure]) -> str:
 
 
 def _block(block: Block) -> str:
+    if isinstance(block, Figure):
+        return _figures([block])
     if isinstance(block, Equation):
         return f"\\begin{{equation}}\n{block.latex}\n\\end{{equation}}\n"
     if isinstance(block, Table):
