@@ -27,7 +27,7 @@ def test_english_and_thai_are_there():
 @pytest.mark.parametrize("lang", languages())
 def test_keys_and_blanks_agree(lang):
     english, other = load_words("en").table, load_words(lang).table
-    assert {key for key in other if not key.startswith("said.")} == set(english)
+    assert {key for key in other if not key.startswith(("said.", "error."))} == set(english)
     for key, text in english.items():
         assert blanks(other[key]) == blanks(text), key
         assert other[key].strip(), key
@@ -64,6 +64,52 @@ def test_every_sentence_that_is_logged_can_be_said(lang):
     assert {k for k in others - set(sentences) if not k.startswith(beginnings)} == set()
 
 
+def raised() -> set[str]:
+    """Shapes of the lines of every JobError that a recording can cause, out of the source: `{}` for what is filled in."""
+
+    def shape(node: ast.expr) -> str:
+        if isinstance(node, ast.JoinedStr):
+            return "".join(shape(part) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+        return str(node.value) if isinstance(node, ast.Constant) else "{}"
+
+    toolkit = Path(__file__).parents[1] / "toolkit"
+    rooms = [*(toolkit / "tracking").glob("*.py"), *(toolkit / "series_io").glob("*.py")]
+    found = set()
+    for path in rooms + [toolkit / f"{name}.py" for name in ("track", "calibrate", "video", "analyse", "series")]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            error = node.exc if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) else None
+            if error is not None and (ast.unparse(error.func) == "JobError" or path.name == "series.py"):
+                found.add(shape(error.args[0]))
+    return found
+
+
+@pytest.mark.parametrize("lang", sorted(set(languages()) - {"en"}))
+def test_every_error_of_a_recording_can_be_said(lang):
+    """A Thai class page says in Thai why a recording was not analysed, with every blank filled once."""
+    shapes = raised()
+    table = dict(load_words(lang).under("error."))
+    assert len(shapes) > 60
+    assert sorted(shapes - set(table)) == []
+    for key, told in table.items():
+        assert blanks(told) == {str(i) for i in range(key.count("{}"))}, key
+
+
+def test_an_error_is_said_with_its_parts():
+    from toolkit.report.speech import say_error
+
+    thai = load_words("th")
+    line = "what moves in a.mp4 is no pendulum (it does not turn back); if there is one, give --bob X,Y (its centre in px on the first frame)"
+    told = say_error(thai, line)
+    assert "a.mp4" in told
+    assert "ไม่แกว่งกลับ" in told
+    assert "pendulum" not in told
+    assert say_error(
+        thai, "b.csv: line 7 has 4 cells where 2 are expected; check the delimiter and the decimal mark there"
+    ) == ("b.csv: บรรทัด 7 มี 4 ช่อง แต่ควรมี 2 ตรวจตัวคั่นและจุดทศนิยมตรงนั้น")
+    assert say_error(thai, "no words for this") == "no words for this"
+    assert say_error(load_words("en"), line) == line
+
+
 @pytest.mark.parametrize("lang", languages())
 def test_no_word_switches_mathtext_on(lang):
     """matplotlib sets Thai wrongly in a string with $…$."""
@@ -84,6 +130,7 @@ def test_thai_is_thai():
         section = key.split(".")[0]
         if (
             section in ("language", "symbol", "reference")
+            or key == "error.{}: {}"
             or key in same
             or key in ("date.year_offset", "text.known_g", "meaning.omega_g")
         ):

@@ -89,7 +89,7 @@ def _analyse_one(path: Path, out: Path, scene: Scene, lang: str, formats: tuple[
             scene = Scene.from_toml(own_scene)
         analysis, written = make_report(path, out, scene, formats=formats, lang=lang)
     except PendulabError as error:
-        return BatchRow(path.name, False, " ".join(str(error).split()))
+        return BatchRow(path.name, False, " ".join(str(error).replace(str(path), path.name).split()))
     except Exception as error:
         return BatchRow(path.name, False, f"unexpected trouble ({type(error).__name__}: {error})")
     verdicts = {finding.assumption: finding.verdict for finding in analysis.findings}
@@ -138,6 +138,7 @@ def _index_page(rows: list[BatchRow], lang: str) -> str:
     """The class on one page: each recording's answers, or why it has none; `data-name` heads a cell on a phone."""
     from toolkit.report.html import page_style
     from toolkit.report.notebook import marked
+    from toolkit.report.speech import say_error
     from toolkit.report.words import load_words
 
     words = load_words(lang)
@@ -153,7 +154,7 @@ def _index_page(rows: list[BatchRow], lang: str) -> str:
                 "<tr>" + "".join(f'<td data-name="{html.escape(q)}"><span>{c}</span></td>' for q, c in told) + "</tr>"
             )
         else:
-            failed = f'<td data-name="{html.escape(words("class.failed"))}" colspan="4"><span>{html.escape(row.sentence)}</span></td>'
+            failed = f'<td data-name="{html.escape(words("class.failed"))}" colspan="4"><span>{html.escape(say_error(words, row.sentence))}</span></td>'
             lines.append(f'<tr class="failed"><td data-name="{html.escape(questions[0])}">{cells[0]}</td>{failed}</tr>')
     title = words("class.title", done=sum(row.done for row in rows), all=len(rows))
     style = page_style(lang)

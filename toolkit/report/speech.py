@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from toolkit.report.numbers import number, percent
-from toolkit.report.words import Words
+from toolkit.report.words import Words, load_words
 from toolkit.sentence import Sentence, filled
 
 if TYPE_CHECKING:
@@ -19,6 +21,26 @@ def say(words: Words, text: str) -> str:
         values = {name: _named(words, value) for name, value in text.values.items()}
         return filled(words.table[f"said.{text.key}"], values)
     return str(text)
+
+
+def say_error(words: Words, error: Exception | str) -> str:
+    """An error's one line in the reader's language where it has words for a line of that shape, else as it is.
+
+    The keys under `error.` are the shapes of the English lines, `{}` for what is filled in; that is said likewise.
+    """
+    line = " ".join(str(error).split())
+    for shape, told in _shapes(words.lang):
+        found = shape.fullmatch(line)
+        if found:
+            return told.format(*(say_error(words, part) for part in found.groups()))
+    return line
+
+
+@cache
+def _shapes(lang: str) -> list[tuple[re.Pattern[str], str]]:
+    """Shapes of error lines with their words, those with most letters first."""
+    shapes = sorted(load_words(lang).under("error."), key=lambda pair: -len(pair[0].replace("{}", "")))
+    return [(re.compile("(.*?)".join(map(re.escape, shape.split("{}"))), re.DOTALL), told) for shape, told in shapes]
 
 
 def say_whole(words: Words, text: str) -> str:

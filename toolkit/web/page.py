@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import logging
+import os
 import shutil
 import tempfile
 import uuid
@@ -17,6 +19,8 @@ from toolkit.analyse import SERIES_SUFFIXES, VIDEO_SUFFIXES, is_video
 from toolkit.errors import PendulabError
 from toolkit.make_report import make_report
 from toolkit.report.html import font_face
+from toolkit.report.speech import say_error
+from toolkit.report.words import load_words
 from toolkit.scene import Environment, Pendulum, Scene
 
 _WORDS = {
@@ -36,6 +40,7 @@ _WORDS = {
         "open": "Open the report",
         "all": "Download everything (zip)",
         "working": "Working…",
+        "trouble": "Something unexpected went wrong",
     },
     "th": {
         "title": "จากวิดีโอลูกตุ้มสู่รายงาน",
@@ -53,6 +58,13 @@ _WORDS = {
         "open": "เปิดรายงาน",
         "all": "ดาวน์โหลดทั้งหมด (zip)",
         "working": "กำลังทำงาน…",
+        "trouble": "เกิดข้อผิดพลาดที่ไม่คาดคิด",
+        "searching": "กำลังหาลูกตุ้ม",
+        "tracking": "กำลังติดตามลูกตุ้ม",
+        "compiling the equations, this once": "กำลังคอมไพล์สมการ (ครั้งแรกครั้งเดียว)",
+        "fitting": "กำลังหาค่าพารามิเตอร์",
+        "writing the report": "กำลังเขียนรายงาน",
+        "writing the overlay": "กำลังเขียนวิดีโอซ้อนภาพ",
     },
 }
 
@@ -99,7 +111,7 @@ def _content(visit: _Visit, lang: str) -> None:
                 with frame_place:
                     _frame(visit, words, picture, size)
         except PendulabError as error:
-            ui.notify(str(error), type="negative", multi_line=True)
+            ui.notify(_told(error, visit, lang), type="negative", multi_line=True)
 
     accept = ",".join(sorted(VIDEO_SUFFIXES | SERIES_SUFFIXES))
     upload = ui.upload(label=words["upload"], auto_upload=True, on_upload=receive).props(f'accept="{accept}"')
@@ -125,7 +137,8 @@ def _content(visit: _Visit, lang: str) -> None:
             bar = ui.linear_progress(0.0, show_value=False)
 
         def show_stage() -> None:
-            text.text, bar.value = visit.stage[0] or words["working"], visit.stage[1]
+            stage, bar.value = visit.stage
+            text.text = words.get(stage, stage) or words["working"]
 
         timer = ui.timer(0.2, show_stage)
         try:
@@ -134,10 +147,12 @@ def _content(visit: _Visit, lang: str) -> None:
                 environment=Environment(g_m_per_s2=gravity.value or None),
             )
             await _analyse(visit, scene, lang, slow.value or 1.0, result, words)
-        except PendulabError as error:
+        except Exception as error:
+            if not isinstance(error, PendulabError):
+                logging.getLogger(__name__).exception("a report could not be made")
             result.clear()
             with result:
-                ui.label(str(error)).classes("text-red-700 dark:text-red-300").mark("trouble")
+                ui.label(_told(error, visit, lang)).classes("text-red-700 dark:text-red-300").mark("trouble")
         finally:
             timer.cancel()
             button.enable()
@@ -145,6 +160,13 @@ def _content(visit: _Visit, lang: str) -> None:
     button = ui.button(words["go"], on_click=go).mark("go")
     button.move(target_index=-1)
     result.move(target_index=-1)
+
+
+def _told(error: Exception, visit: _Visit, lang: str) -> str:
+    """The error in the visitor's language, without the folder that their file was put into."""
+    if not isinstance(error, PendulabError):
+        return f"{_WORDS[lang]['trouble']} ({type(error).__name__})"
+    return say_error(load_words(lang), str(error).replace(f"{visit.folder}{os.sep}", ""))
 
 
 def _frame(visit: _Visit, words: dict[str, str], picture: str, size: tuple[int, int]) -> None:
