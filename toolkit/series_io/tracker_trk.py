@@ -24,6 +24,7 @@ _MAX_XML_BYTES = 100_000_000
 _MAX_DEPTH = 100
 _TO_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
 _TO_KG = {"kg": 1.0, "g": 0.001, "mg": 1e-6, "lb": 0.45359237}
+_BLANK_PX = 640.0, 480.0  # of the blank picture that Tracker shows where there is no video
 _TRACKER = "org.opensourcephysics.cabrillo.tracker."
 
 
@@ -260,8 +261,8 @@ def _world(
 def write(series: ThetaSeries, path: Path) -> None:
     """A project that Tracker opens: one point mass on an arc about the origin, one step a sample, pixels to 1e-9.
 
-    Length and pixel scale come from `meta` where known, else 1 m at 600 px/m. A .trk counts frames: raises
-    JobError where the times do not lie on a grid to a hundredth of a step.
+    The length comes from `meta` where known, else it is 1 m; the arc lies within Tracker's blank picture. A .trk counts
+    frames: raises JobError where the times do not lie on a grid to a hundredth of a step.
     """
     xml = _project(series).encode("utf-8")
     if path.suffix.lower() == ".trz":
@@ -276,10 +277,10 @@ def write(series: ThetaSeries, path: Path) -> None:
 def _project(series: ThetaSeries) -> str:
     frames, step_s, start_s = _frames(series.t_s)
     length = float(series.meta.get("length_m", 1.0))
-    scale = 600.0
-    radius = length * scale
-    x0, y0 = round(radius) + 40.0, round(radius) + 40.0
-    width = 2 * x0
+    width, height = _BLANK_PX
+    x0, y0 = width / 2, height / 2
+    radius = y0 - 20.0
+    scale = radius / length
     x = x0 + radius * np.sin(series.theta_rad)
     y = y0 + radius * np.cos(series.theta_rad)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', f'<object class="{_TRACKER}TrackerPanel">']
@@ -304,7 +305,7 @@ def _project(series: ThetaSeries) -> str:
     media = "org.opensourcephysics.media.core."
     prop(1, "semantic_version", "string", "5.1.5")
     prop(1, "width", "double", width)
-    prop(1, "height", "double", width)
+    prop(1, "height", "double", height)
     prop(1, "magnification", "double", -1.0)
     opened(1, "videoclip", "object", media + "VideoClip")
     prop(2, "video_framecount", "int", int(frames[-1]) + 1)
