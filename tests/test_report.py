@@ -523,18 +523,33 @@ def test_long_records_stay_small(analysis):
 # -- in a notebook and a terminal -------------------------------------------------------------------------------------
 
 
+def made_track():
+    from toolkit.track import Track
+
+    x = np.array([1.0, 2.0, np.nan, 3.0, 2.0, 1.0])
+    one = np.ones(6)
+    status = np.array(["ok", "ok", "lost", "ok", "ok", "ok"])
+    meta = {"warnings": ["a < b"]}
+    return Track(np.arange(6), np.arange(6) / 30, x, x, one, one, status, 5.0, (2.0, -9.0), (0.1, 0.2), "disc", meta)
+
+
 def test_results_print_themselves(analysis):
-    from toolkit.report.notebook import analysis_html, finding_html, fit_html, series_html
+    from toolkit.report.notebook import analysis_html, finding_html, fit_html, series_html, trajectory_html
     from toolkit.report.terminal import summary_lines
+    from toolkit.simulate import simulate
 
     shown = [series_html(analysis.series), fit_html(analysis.best), analysis_html(analysis, "th")]
     shown += [finding_html(finding) for finding in analysis.findings]
+    shown += [trajectory_html(simulate(Scene(), np.linspace(0, 2, 50)))]
+    shown += [made_track()._repr_html_()]
     for html in shown:
         parser = Outside()
         parser.feed(html)
         assert parser.open == []
         assert parser.found == []
     assert "k<sub>d</sub>" in shown[1]
+    assert "5 of 6 frames measured by the disc localiser" in shown[-1]
+    assert "50 points to t = 2 s" in shown[-2]
     lines = summary_lines(analysis)
     assert any("k_d" in line for line in lines)
     assert not any("{" in line or "\n" in line for line in lines)

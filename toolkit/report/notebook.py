@@ -5,6 +5,9 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from toolkit.report.material import thinned
 from toolkit.report.numbers import number, rich, with_uncertainty
 
 if TYPE_CHECKING:
@@ -12,6 +15,8 @@ if TYPE_CHECKING:
     from toolkit.checks.finding import Finding
     from toolkit.fit import FitResult
     from toolkit.series import ThetaSeries
+    from toolkit.track import Track
+    from toolkit.trajectory import Trajectory
 
 _TAGS = {"sub": "sub", "sup": "sup", "bold": "strong", "code": "code"}
 _TONES = {"fails": "#b34700", "holds": "#00704f"}
@@ -24,23 +29,55 @@ def marked(text: str) -> str:
 
 def series_html(series: ThetaSeries) -> str:
     """How many points, how long, how far it swings, and a sketch of θ(t)."""
-    import numpy as np
-
-    from toolkit.report.material import thinned
-
     low, high = np.degrees([series.theta_rad.min(), series.theta_rad.max()])
     sigma = (
         "–" if series.sigma_theta_rad is None else f"{number(float(np.degrees(np.median(series.sigma_theta_rad))), 2)}°"
     )
-    some = thinned(len(series), 600)
-    t, theta = series.t_s[some], series.theta_rad[some]
-    x = 400 * (t - t[0]) / (series.duration_s or 1)
-    y = 55 - 50 * (theta - theta.mean()) / (np.abs(theta - theta.mean()).max() or 1)
-    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y))
-    line = f'<polyline points="{points}" fill="none" stroke="#0072b2" stroke-width="0.8"/>'
     head = f"{len(series)} points, {number(series.duration_s, 4)} s, θ from {number(low, 3)}° to {number(high, 3)}°, median σ {sigma}"
     source = escape(str(series.meta.get("source", "")))
-    return f'<div><b>θ(t)</b> {source}<br>{marked(head)}<br><svg viewBox="0 0 400 110" width="400" height="110">{line}</svg></div>'
+    return f"<div><b>θ(t)</b> {source}<br>{marked(head)}<br>{_sketch(series.t_s, series.theta_rad)}</div>"
+
+
+def _sketch(x: np.ndarray, y: np.ndarray) -> str:
+    """A line through at most 600 of the points."""
+    some = thinned(x.size, 600)
+    some = some[np.isfinite(x[some] + y[some])]
+    if some.size < 2:
+        return ""
+    across = 400 * (x[some] - x[some].min()) / (np.ptp(x[some]) or 1.0)
+    down = 105 - 100 * (y[some] - y[some].min()) / (np.ptp(y[some]) or 1.0)
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, down))
+    line = f'<polyline points="{points}" fill="none" stroke="#0072b2" stroke-width="0.8"/>'
+    return f'<svg viewBox="0 0 400 110" width="400" height="110">{line}</svg>'
+
+
+def track_html(track: Track) -> str:
+    """How many frames were measured and how well, the pivot, a sketch of x(t), and what to know."""
+    ok = track.ok
+    sigma = "–" if not ok.any() else number(float(np.median(np.hypot(track.sigma_x_px[ok], track.sigma_y_px[ok]))), 2)
+    pivot = ", ".join(with_uncertainty(p, u, "px") for p, u in zip(track.pivot_px, track.pivot_sigma_px))
+    head = (
+        f"{int(ok.sum())} of {ok.size} frames measured by the {track.localiser} localiser, median σ {sigma} px, "
+        f"bob's radius {number(track.radius_px, 3)} px, pivot at {pivot}"
+    )
+    notes = "".join(f"<li>{escape(str(line))}</li>" for line in track.meta.get("warnings", ()))
+    source = escape(str(track.meta.get("source", "")))
+    return f"<div><b>Track</b> {source}<br>{marked(head)}<br>{_sketch(track.t_s, track.x_px)}<ul>{notes}</ul></div>"
+
+
+def trajectory_html(trajectory: Trajectory) -> str:
+    """The route taken, its error and cost, a sketch of θ(t), events and warnings."""
+    theta, error = np.degrees(trajectory.theta_rad), trajectory.error_estimate_rad
+    head = (
+        f"{theta.size} points to t = {number(float(trajectory.t_s[-1]), 4)} s, θ from {number(float(theta.min()), 3)}° to "
+        f"{number(float(theta.max()), 3)}°; {trajectory.method}, {number(1e3 * trajectory.cost.cpu_s, 2)} ms of CPU"
+    )
+    if error is not None:
+        head += f"; error of θ about {number(error, 2)} rad ({number(trajectory.accuracy_rad, 2)} rad asked for)"
+    notes = "".join(f"<li>{escape(str(line))}</li>" for line in trajectory.warnings)
+    notes += "".join(f"<li>{escape(e.kind)} at t = {number(e.t_s, 6)} s</li>" for e in trajectory.events[:20])
+    sketch = _sketch(trajectory.t_s, trajectory.theta_rad)
+    return f"<div><b>Trajectory</b><br>{marked(head)}<br>{sketch}<ul>{notes}</ul></div>"
 
 
 def fit_html(result: FitResult, lang: str = "en") -> str:
