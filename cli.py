@@ -427,12 +427,12 @@ def _fail(sentence: str, code: int, tail: str = "") -> None:
     sys.exit(code)
 
 
-def _report(recording: Path, scene: "Scene", out: Path, **choices: Any) -> None:
+def _report(recording: Path, scene: "Scene", out: Path, lang: str, **choices: Any) -> None:
     from toolkit.make_report import make_report
 
     with _progress() as progress:
-        analysis, written = make_report(recording, out, scene, progress=progress, **choices)
-    _print_analysis(analysis)
+        analysis, written = make_report(recording, out, scene, lang=lang, progress=progress, **choices)
+    _print_analysis(analysis, lang)
     for path in written:
         typer.echo(path)
 
@@ -466,12 +466,11 @@ def _point(text: str | None, option: str) -> tuple[float, float] | None:
     return x, y
 
 
-def _print_analysis(analysis: "Analysis") -> None:
+def _print_analysis(analysis: "Analysis", lang: str = "en") -> None:
     from toolkit.report.terminal import summary_lines
 
-    for line in summary_lines(analysis):
+    for line in summary_lines(analysis, lang):
         typer.echo(line)
-    _print_warnings(analysis.series.meta.get("warnings", ()))
 
 
 def _print_warnings(sentences: Any) -> None:

@@ -327,3 +327,12 @@ def test_stopping_leaves_nothing_behind(tmp_path):
     assert said.splitlines()[-1].startswith("pendulab: stopped")
     assert "Traceback" not in said
     assert not (tmp_path / "out").exists()
+
+
+def test_the_terminal_speaks_the_reports_language_and_tells_a_wrong_length(tmp_path):
+    series = swing(tmp_path / "swing.csv")
+    thai = pendulab("report", series, "--length-m", "0.3", "--lang", "th", "--format", "md", "--out", tmp_path / "th")
+    assert thai.returncode == 0, thai.stderr
+    assert "หมายเหตุ: ความยาวที่ให้มา" in thai.stdout
+    english = pendulab("fit", series, "--length-m", "0.3", "--out", tmp_path / "en")
+    assert "note: The length given, 0.3 m, contradicts the period" in english.stdout

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 def summary_lines(analysis: Analysis, lang: str = "en") -> list[str]:
-    """What was measured, the answers, and the verdicts, one line each (long ones wrapped)."""
-    from toolkit.report.essentials import MAIN, facts, lead
+    """What was measured, the answers, the verdicts, and what was noted, one line each (long ones wrapped)."""
+    from toolkit.report.essentials import MAIN, facts, lead, notes
     from toolkit.report.material import Material
     from toolkit.report.speech import assumption, remedy, sentence
     from toolkit.report.words import load_words
@@ -29,4 +29,5 @@ def summary_lines(analysis: Analysis, lang: str = "en") -> list[str]:
             title = assumption(words, finding)
             text = f"{bare(title)}: {words(f'verdict.{finding.verdict}')}. {bare(sentence(words, finding))} {bare(remedy(words, finding))}"
             lines += textwrap.wrap(text, 110, subsequent_indent="  ")
+    lines += [f"{words('page.note')}: {bare(note)}" for note in notes(material)]
     return lines
