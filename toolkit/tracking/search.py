@@ -36,6 +36,32 @@ def shrink(plane: np.ndarray, factor: int) -> np.ndarray:
     return cut.astype(np.float32)
 
 
+def still_picture(planes: list[np.ndarray]) -> np.ndarray:
+    """The median of each pixel over the planes (h, w): what stands still, where nothing covers it half the time."""
+    import cv2
+
+    planes = list(planes)
+    for i in range(len(planes) // 2 + 1):  # a bubble sort as far as the middle: whole pictures at a time
+        for j in range(len(planes) - 1, i, -1):
+            a, b = planes[j - 1], planes[j]
+            planes[j - 1], planes[j] = cv2.min(a, b), cv2.max(a, b)
+    return planes[len(planes) // 2]
+
+
+def silhouette(image: np.ndarray, back: np.ndarray) -> np.ndarray:
+    """(h, w) float32 from 0 to 100: where a piece of a frame differs from what stands still, in whatever light. What differs at
+    all counts as much as what differs much: a bob's pattern is no outline."""
+    gain = rim_level(image / np.maximum(back, 1.0))
+    away = np.abs(image - gain * back)
+    clear = max(8.0, 4 * rim_level(away), 0.3 * float(np.percentile(away, 95)))
+    return np.minimum(100 * away / clear, 100.0).astype(np.float32)
+
+
+def rim_level(picture: np.ndarray) -> float:
+    """The median of its outermost pixels."""
+    return float(np.median(np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])))
+
+
 def even_light(samples: list[np.ndarray]) -> list[np.ndarray]:
     """The pictures (h, w) with each row's brightness as it is on most of them: flicker and drifting light are no motion."""
     if len(samples) < 5:
@@ -45,7 +71,7 @@ def even_light(samples: list[np.ndarray]) -> list[np.ndarray]:
     return [(p / np.clip(g, 0.5, 2.0)[:, None]).astype(np.float32) for p, g in zip(samples, gains)]
 
 
-def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 8) -> list[Hypothesis]:
+def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 24) -> list[Hypothesis]:
     """Hypotheses, best first, from shrunken frames (h, w) float32 that `factor` has shrunk; needs three or more."""
     import cv2
 
@@ -76,11 +102,10 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 8) -> 
         for radius in radii:
             bin_size = max(1.0, radius / 7)
             for sign in (-1, 1):
-                x, y, votes = _vote(columns, rows, nx, ny, weight, sign * radius, bin_size, picture.shape)
-                score = votes / (2 * np.pi * radius)
-                found.append(
-                    Hypothesis(k, (x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5, radius * factor, sign, score)
-                )
+                for x, y, votes in _vote(columns, rows, nx, ny, weight, sign * radius, bin_size, picture.shape):
+                    score = votes / (2 * np.pi * radius)
+                    u, v = (x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5
+                    found.append(Hypothesis(k, u, v, radius * factor, sign, score))
     found.sort(key=lambda h: -h.score)
     return _distinct(found, most)
 
@@ -106,19 +131,53 @@ def find_round_near(
     weight = np.sqrt(length / strong).clip(0, 1)
     nx, ny = gx[rows, columns] / length, gy[rows, columns] / length
     bin_size = max(1.0, radius_px / 7)
-    x, y, votes = _vote(columns, rows, nx, ny, weight, sign * radius_px, bin_size, picture.shape)
+    x, y, votes = _vote(columns, rows, nx, ny, weight, sign * radius_px, bin_size, picture.shape)[0]
+    x, y = _centred(x, y, columns, rows, -sign * nx, -sign * ny, weight, radius_px)
     return x, y, votes / (2 * np.pi * radius_px)
 
 
+def _centred(
+    x: float,
+    y: float,
+    columns: np.ndarray,
+    rows: np.ndarray,
+    nx: np.ndarray,
+    ny: np.ndarray,
+    weight: np.ndarray,
+    radius: float,
+) -> tuple[float, float]:
+    """The centre of the circle of about this radius through the edge pixels near it that face away from it (nx, ny): what part
+    of the outline is missing moves it little."""
+    start, a = (x, y), np.zeros(3)
+    for _ in range(6):
+        dx, dy = columns - start[0] - a[0], rows - start[1] - a[1]
+        d = np.hypot(dx, dy) + 1e-9
+        rest = d - radius - a[2]
+        faces = (dx * nx + dy * ny) / d
+        w = np.where((faces > 0.85) & (np.abs(rest) < 0.3 * radius), weight / (1 + rest**2), 0.0)
+        design = np.column_stack([dx / d, dy / d, np.ones(d.size)])
+        normal = (design * w[:, None]).T @ design + np.diag([0.1, 0.1, 0.2 * w.sum() + 0.1])
+        step = np.linalg.solve(normal, design.T @ (w * rest) - np.array([0, 0, (0.2 * w.sum() + 0.1) * a[2]]))
+        a = a + step
+        if np.abs(step).max() < 0.02:
+            break
+    if not np.hypot(a[0], a[1]) < 0.4 * radius:
+        return start
+    return start[0] + float(a[0]), start[1] + float(a[1])
+
+
 def _distinct(found: list[Hypothesis], most: int) -> list[Hypothesis]:
-    """The best few that are not the same circle again; at most three of one radius and sign."""
+    """The best few that are not the same circle again; at most three of one radius and sign near one place on its way:
+    something large that passes by must not take all the places from a bob of its size."""
     kept: list[Hypothesis] = []
     for h in found:
         if len(kept) == most:
             break
         alike = [o for o in kept if o.sign == h.sign and 0.75 < o.radius_px / h.radius_px < 1.34]
-        near = any(np.hypot(o.x_px - h.x_px, o.y_px - h.y_px) < h.radius_px and o.sample == h.sample for o in kept)
-        if not near and len(alike) < 3:
+        same = any(np.hypot(o.x_px - h.x_px, o.y_px - h.y_px) < h.radius_px and o.sample == h.sample for o in kept)
+        rivals = sum(any(o.sample == r.sample and r.score > o.score for r in alike) for o in alike)
+        second = any(o.sample == h.sample for o in alike)
+        if not same and (rivals if second else len(alike) - rivals) < 3:
             kept.append(h)
     return kept
 
@@ -132,10 +191,12 @@ def _vote(
     reach: float,
     bin_size: float,
     shape: tuple[int, ...],
-) -> tuple[float, float, float]:
-    """Centre (shrunken px) with most votes at signed distance `reach` along the gradient, and how many it has."""
+) -> list[tuple[float, float, float]]:
+    """The two centres (shrunken px) with most votes at signed distance `reach` along the gradient, and how many each has."""
     height, width = int(shape[0] / bin_size) + 3, int(shape[1] / bin_size) + 3
-    return tuple(_compiled()(columns, rows, nx, ny, weight, reach, bin_size, height, width))
+    found = np.zeros((2, 3))
+    _compiled()(columns, rows, nx, ny, weight, reach, bin_size, height, width, found)
+    return [(float(x), float(y), float(votes)) for x, y, votes in found]
 
 
 @cache
@@ -143,7 +204,7 @@ def _compiled() -> Any:
     import numba
 
     @numba.njit(cache=True, nogil=True)
-    def vote(columns, rows, nx, ny, weight, reach, bin_size, height, width):
+    def vote(columns, rows, nx, ny, weight, reach, bin_size, height, width, found):
         # a bright bob's gradient points inwards, a dark one's outwards: `reach` carries the sign
         table = np.zeros((height, width), np.float32)
         for i in range(columns.size):
@@ -151,25 +212,30 @@ def _compiled() -> Any:
             v = int(np.floor((rows[i] + reach * ny[i]) / bin_size + 0.5)) + 1
             if 0 < u < width - 1 and 0 < v < height - 1:
                 table[v, u] += weight[i]
-        best, at_u, at_v = -1.0, 1, 1
-        for v in range(1, height - 1):
-            for u in range(1, width - 1):
-                if table[v, u] > 0:
-                    total = 0.0
-                    for b in range(-1, 2):
-                        for a in range(-1, 2):
-                            total += table[v + b, u + a]
-                    if total > best:
-                        best, at_u, at_v = total, u, v
-        sum_u = sum_v = total = 0.0
-        for b in range(-1, 2):
-            for a in range(-1, 2):
-                w = table[at_v + b, at_u + a]
-                sum_u += w * (at_u + a)
-                sum_v += w * (at_v + b)
-                total += w
-        if total <= 0:
-            return 0.0, 0.0, 0.0
-        return (sum_u / total - 1) * bin_size, (sum_v / total - 1) * bin_size, total
+        apart = int(abs(reach) / bin_size) + 1
+        for which in range(2):
+            best, at_u, at_v = -1.0, 1, 1
+            for v in range(1, height - 1):
+                for u in range(1, width - 1):
+                    if table[v, u] > 0:
+                        total = 0.0
+                        for b in range(-1, 2):
+                            for a in range(-1, 2):
+                                total += table[v + b, u + a]
+                        if total > best:
+                            best, at_u, at_v = total, u, v
+            sum_u = sum_v = total = 0.0
+            for b in range(-1, 2):
+                for a in range(-1, 2):
+                    w = table[at_v + b, at_u + a]
+                    sum_u += w * (at_u + a)
+                    sum_v += w * (at_v + b)
+                    total += w
+            if total <= 0:
+                return
+            found[which, 0] = (sum_u / total - 1) * bin_size
+            found[which, 1] = (sum_v / total - 1) * bin_size
+            found[which, 2] = total
+            table[max(0, at_v - apart) : at_v + apart + 1, max(0, at_u - apart) : at_u + apart + 1] = 0
 
     return vote

@@ -20,7 +20,9 @@ class Shake:
         n = len(r.index)
         self.raw_x, self.raw_y, self.sigma = np.zeros(n), np.zeros(n), np.zeros(n)
         self.x, self.y = self.raw_x, self.raw_y
-        known: dict[int, CameraShift] = {**follower.checks, **{k: s for k, s in enumerate(r.shift) if s is not None}}
+        row = {index: k for k, index in enumerate(r.index)}
+        known: dict[int, CameraShift] = {row[i]: s for i, s in follower.checks.items() if i in row}
+        known |= {k: s for k, s in enumerate(r.shift) if s is not None}
         if not follower.shaking or not known:
             return
         at = np.array(sorted(known))

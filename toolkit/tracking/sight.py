@@ -101,6 +101,8 @@ def best_sight(frames: list[Frame], places: list[tuple[float, float]], radius_px
     mix = np.linalg.solve(noise, difference)
     by_mix = float(np.sqrt(difference @ mix))
     # a wall's texture counts as noise here, but is learned later: where brightness differs much, it will do
+    if not by_mix > 0:
+        return Sight()
     if (by_luma > 6 and abs(difference[0]) > 20) or (by_luma > 2.5 and abs(difference[0]) > 35) or by_mix < 2 * by_luma:
         return Sight()
     mix = mix / np.abs(mix).sum()
