@@ -6,6 +6,7 @@ python docs/generate.py --check    say which pages are out of date; exit 1 if an
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -35,13 +36,44 @@ def commands_page() -> str:
                     text += f" Default: {parameter.default}."
             rows.append(f"| `{label}` | {text.replace('|', chr(92) + '|')} |")
         if rows:
-            lines += ["| | |", "|---|---|", *rows, ""]
+            lines += ["| argument or option | meaning |", "|---|---|", *rows, ""]
     return "\n".join(lines)
 
 
-def listing_page(title: str, text: str) -> str:
-    """A page that shows what one of the listing commands prints."""
-    return f"# {title}\n\n```text\n{text.rstrip()}\n```\n"
+def listing_page(title: str, command: str, text: str) -> str:
+    """A page that tells what one of the listings says: a heading a part, its equation set, its parameters in a table."""
+    lines = [f"# {title}", ""]
+    if command:
+        lines += [f"`pendulab {command}` prints the same.", ""]
+    for block in text.rstrip().split("\n\n"):
+        name, *rest = block.splitlines()
+        if not rest or not rest[0].startswith("  "):  # a note under the parts
+            lines += [" ".join(block.split()), ""]
+            continue
+        part, bracket, remark = name.partition(" (")
+        meaning = f"{rest[0].strip().rstrip('.')}."
+        lines += [f"## {part}", "", f"{meaning[0].upper()}{meaning[1:]}{bracket}{remark}", ""]
+        parameters, others = [], []
+        for line in rest[1:]:
+            parameter = re.fullmatch(r"  (\w+) \[(.*?)\]  (.*?)(?: \(([^()]*(?:\([^()]*\)[^()]*)*)\))?", line)
+            if parameter:
+                symbol, *cells = parameter.groups("")
+                parameters.append(f"| `{symbol}` | {' | '.join(map(_cell, cells))} |")
+                continue
+            key, said = line.strip().split(None, 1)
+            if key == "equation":
+                lines += ["$$", said, "$$", ""]
+            else:
+                others.append(f"- **{key}**: {_cell(said)}")
+        if parameters:
+            lines += ["| parameter | unit | meaning | range |", "|---|---|---|---|", *parameters, ""]
+        lines += [*others, ""] if others else []
+    return "\n".join(lines)
+
+
+def _cell(text: str) -> str:
+    """Text that Markdown leaves as it is."""
+    return re.sub(r"([|*_<])", r"\\\1", text)
 
 
 def pages() -> dict[str, str]:
@@ -50,10 +82,10 @@ def pages() -> dict[str, str]:
 
     return {
         "commands.md": commands_page(),
-        "effects.md": listing_page("What can act on a pendulum", catalogue.describe_effects()),
-        "models.md": listing_page("What can be fitted", catalogue.describe_models()),
-        "camera.md": listing_page("What a rendered camera can do", catalogue.describe_camera_effects()),
-        "trackers.md": listing_page("What can localise a bob", catalogue.describe_trackers()),
+        "effects.md": listing_page("What can act on a pendulum", "effects", catalogue.describe_effects()),
+        "models.md": listing_page("What can be fitted", "models", catalogue.describe_models()),
+        "camera.md": listing_page("What a rendered camera can do", "", catalogue.describe_camera_effects()),
+        "trackers.md": listing_page("What can localise a bob", "trackers", catalogue.describe_trackers()),
     }
 
 
