@@ -158,3 +158,44 @@ def test_pictures_of_any_layout_give_the_same_place():
     expected = fit_disc(patch, look, guess)
     for other in (np.asfortranarray(image), image.astype(float), wide[:, 10:66]):
         np.testing.assert_array_equal(fit_disc(patch._replace(image=other), look, guess), expected)
+
+
+def painted(cx, cy, paint, sigma=0.8, size=56, over=4):
+    """A disc with a soft edge whose own brightness is paint(u, v), u and v from −1 to 1 across it, blurred as its edge is."""
+    from scipy.ndimage import gaussian_filter
+
+    at = (np.arange(size * over) + 0.5) / over - 0.5
+    u, v = np.meshgrid((at - cx) / RADIUS, (at - cy) / RADIUS)
+    sharp = np.where(u * u + v * v < 1, paint(u, v), WALL)
+    return gaussian_filter(sharp, sigma * over).reshape(size, over, size, over).mean(axis=(1, 3)).astype(np.float32)
+
+
+# what is painted, and the rms error allowed, px
+PAINTS = {
+    "halves": (lambda u, v: np.where(0.6 * u + 0.8 * v > 0, 40.0, 110.0), 0.07),
+    "upright stripes": (lambda u, v: np.where(np.sin(11 * u + 0.5) > 0, 40.0, 110.0), 0.03),
+    "stripes on a ball": (
+        lambda u, v: np.where(
+            np.sin(3 * np.arctan2(u, np.sqrt(np.maximum(1 - u * u - v * v, 1e-6))) + 0.7) > 0, 40.0, 110.0
+        ),
+        0.13,
+    ),
+    "spot": (lambda u, v: np.where((u - 0.35) ** 2 + (v + 0.4) ** 2 < 0.1, 130.0, 40.0), 0.05),
+}
+
+
+@pytest.mark.parametrize("name", PAINTS)
+def test_the_outline_is_found_whatever_is_painted_on_the_bob(name):
+    """The centroid of what is dark is off by up to a pixel."""
+    rng = np.random.default_rng(6)
+    look, (paint, allowed) = Look(RADIUS, 0.8, -100.0, NOISE, even=False), PAINTS[name]
+    errors = {"edge": [], "colour_moments": []}
+    for _ in range(12):
+        x, y = 28 + rng.uniform(-1, 1, 2)
+        image = painted(x, y, paint) + rng.normal(0, NOISE, (56, 56)).astype(np.float32)
+        guess = Guess(300 + x + rng.uniform(-1, 1), 500 + y + rng.uniform(-1, 1))
+        for tracker, found in errors.items():
+            place = load_tracker(tracker).locate(patch_of(image), look, guess)
+            found.append((place.x_px - 300 - x, place.y_px - 500 - y))
+    rms = {tracker: np.sqrt(np.mean(np.square(found))) for tracker, found in errors.items()}
+    assert rms["edge"] < min(allowed, 0.6 * rms["colour_moments"])

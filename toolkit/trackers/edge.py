@@ -8,7 +8,8 @@ ray. The centre is the likeliest over all rays; a ray that disagrees with the ot
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -56,14 +57,13 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         if longest > 0.5
         else 0 * angles.astype(int)
     )
-    design = np.column_stack([ux, uy, np.ones(ux.size)])
     level = float(2.0 ** np.round(np.log2(noise)))
     change = _CHANGE if not look.even else 0.25 * _CHANGE
     wide = max(1.0, look.radius_px / 6)
+    unit, step = wide, 0.0  # coarse at first: what is drawn is mistaken for the outline less, and the reach is far
     for turn in range(10):
-        unit = (
-            wide if turn < 2 else 1.0
-        )  # coarse at first: what is drawn is mistaken for the outline less, and the reach is far
+        if turn > 1 or (turn and step < 0.5):
+            unit = 1.0
         edge = float(round(max(look.edge_px / unit, 0.3), 2))
         r = _grid(edge, longest / unit)
         x = centre[0] + ux[:, None] * (look.radius_px + unit * r)
@@ -89,14 +89,14 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         least = cost.min(axis=1)
         scale = max(1.0, float(np.median(least[inside])) / r.size)
         cost = (cost - least[:, None]) / scale
-        found, info, apart = _likeliest(cost, design, inside)
+        found, variance, apart = _likeliest(cost, ux, uy, inside)
         step = unit * float(np.hypot(found[0], found[1]))
         centre += unit * np.clip(found[:2], -1.5, 1.5)
-        if unit == 1 and step < 0.02:
+        if unit == 1 and step < 0.05:  # the costs were taken on rays from there
             break
     if step > 0.3:
         return None
-    sigma = np.sqrt(np.diag(np.linalg.inv(info)))
+    sigma = np.sqrt(variance)
     within = profile[:, (r < -0.5 - edge) & (r > -3.0 - edge)].mean(axis=1)
     beyond = profile[:, -3:].mean(axis=1)
     seen = inside & (apart < 2 * _FAR) & (np.abs(within - beyond) > max(0.12, 3 * noise))
@@ -110,28 +110,24 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
     return place, look.radius_px + float(found[2])
 
 
-def _likeliest(cost: np.ndarray, design: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x, y and radius (px off the present ones) of the least robust sum, its curvature, and each ray's misfit there."""
-    h = _SHIFTS[1] - _SHIFTS[0]
-    slope = np.gradient(cost, h, axis=1)
-    curve = np.gradient(slope, h, axis=1)
-    a = np.zeros(3)
-    rows = np.arange(design.shape[0])
-    prior = np.diag([1e-6, 1e-6, 1 / _RADIUS**2])
-    for _ in range(30):
-        at = np.clip((design @ a - _SHIFTS[0]) / h, 0, _SHIFTS.size - 1.001)
-        i = at.astype(int)
-        f = at - i
-        value, first, second = (v[rows, i] * (1 - f) + v[rows, i + 1] * f for v in (cost, slope, curve))
-        weight = inside / (1 + np.maximum(value, 0) / _FAR)
-        bend = np.maximum(second, first**2 / (2 * np.maximum(value, 1e-3) + 1.0)) * weight
-        info = 0.5 * (design.T * bend) @ design + prior
-        step = -np.linalg.solve(info, 0.5 * design.T @ (first * weight) + prior @ a)
-        step *= min(1.0, 0.3 / max(1e-9, np.abs(step).max()))
-        a = a + step
-        if np.abs(step).max() < 1e-3:
-            break
-    return a, info, np.where(inside, value, np.inf)
+@cache
+def _kernel() -> Any:
+    from toolkit.motion.compiled import kernel
+
+    return kernel("likeliest", "toolkit.trackers._outline_kernel", "the outline fit")
+
+
+def _likeliest(
+    cost: np.ndarray, ux: np.ndarray, uy: np.ndarray, inside: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x, y and radius (px off the present ones) of the least robust sum, their variances, and each ray's misfit there."""
+    numbers = np.zeros(64)
+    numbers[:4] = _SHIFTS[0], _SHIFTS[1] - _SHIFTS[0], _FAR, _RADIUS
+    result, apart = np.empty(6), np.empty(ux.size)
+    arrays = (np.ascontiguousarray(cost), ux, uy, inside.astype(float), numbers, result, apart)
+    places = np.array([*(a.ctypes.data for a in arrays), *cost.shape, 0], np.int64)
+    _kernel()(places[-1:].ctypes.data, None, places.ctypes.data)
+    return result[:3], result[3:], apart
 
 
 def _grid(edge: float, longest: float) -> np.ndarray:
@@ -144,10 +140,11 @@ def _misfits(profile: np.ndarray, whitened: tuple[np.ndarray, np.ndarray, np.nda
     """Minus twice the log-likelihood of each place of the outline, (rays, places), up to a constant."""
     whiten, mean, volume = whitened
     places, size, _ = whiten.shape
-    white = whiten.reshape(places * size, size) @ profile.T
-    white -= (sign * mean).reshape(-1, 1)
+    # laid out anew: a transposed view takes OpenBLAS a hundred times as long
+    white = whiten.reshape(places * size, size) @ np.ascontiguousarray(profile.T)
+    white -= np.float32(sign) * mean.reshape(-1, 1)
     white *= white
-    return np.asarray(white.reshape(places, size, -1).sum(axis=1).T + volume)
+    return np.asarray(white.reshape(places, size, -1).sum(axis=1).T + volume, float)
 
 
 @lru_cache(maxsize=64)
@@ -178,7 +175,8 @@ def _likelihood(
         whiten.append(inverse)
         mean.append(inverse @ rims[0])
         volume.append(2 * np.log(np.diag(lower)).sum())
-    return np.array(whiten), np.array(mean), np.array(volume)
+    plain = [np.where(np.abs(a) < 1e-9, 0, a).astype(np.float32) for a in (whiten, mean)]  # denormal numbers are slow
+    return plain[0], plain[1], np.array(volume)
 
 
 LOCALISER = Localiser("edge", "likeliest outline before the background; for bobs with a pattern or a highlight", locate)
