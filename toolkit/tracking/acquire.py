@@ -296,8 +296,8 @@ def _follow(
     if radius:
         look = look._replace(radius_px=radius)
     quality = abs(contrast) / (noise + 1.0)
-    way = float(np.hypot(*np.ptp(list(points.values()), axis=0)))
-    moved = min(1.0, 0.25 * way / look.radius_px)  # what stands still on a wall that shakes explains little change
+    extent = float(np.hypot(*np.ptp(list(points.values()), axis=0)))
+    moved = min(1.0, 0.25 * extent / look.radius_px)  # what stands still on a wall that shakes explains little change
     score = (len(points) / len(batch)) ** 2 * quality * moved * look.radius_px**0.5 / (0.3 + swing.rms_px)
     if stage is not None and stage.silhouette:
         look = look._replace(contrast=_contrast(batch, points, look.radius_px, stage.still))

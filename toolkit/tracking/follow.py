@@ -101,13 +101,14 @@ class Follower(Known):
         if not self.look.even:
             return self._locate_uneven(patch, guess)
         if not self.hidden and len(self.recent) == 3:
-            place = self.localiser.locate(patch, self.look, guess)
+            place = self.localiser.locate(patch, self.look_at(guess), guess)
             if np.isfinite(place.x_px):
                 return place
-        wide = fit_disc(patch, self.look._replace(noise=np.inf), guess, soften=2.5, turns=12)
+        look = self.look_at(guess)
+        wide = fit_disc(patch, look._replace(noise=np.inf), guess, soften=2.5, turns=12)
         if wide is not None:  # beside a shadow, a wide look may find nothing where a close one does
             guess = guess._replace(x_px=wide[0] + patch.x_px, y_px=wide[1] + patch.y_px)
-        return self.localiser.locate(patch, self.look, guess)
+        return self.localiser.locate(patch, look, guess)
 
     def _locate_uneven(self, patch: Patch, guess: Guess) -> Place:
         """A bob with a pattern: its silhouette says about where; the localiser, how exactly, if it agrees."""
@@ -184,14 +185,20 @@ class Follower(Known):
         level = float(patch.back[rows[inside], columns[inside]].mean()) if inside.any() else 0.0
         return float(np.clip(place.wall / level, 0.3, 3.0)) if level > 1 else 1.0
 
+    def _shade_now(self, patch: Patch, place: Place) -> float:
+        """The bob's brightness in the light of when the background was learned: the wall beside it is darker or brighter now
+        because the light is, or because something else stands there; whichever leaves the bob as it was."""
+        seen = place.contrast + place.wall
+        shades = (seen / self._light(patch, place), seen)
+        return shades[0] if np.isnan(self._shade) else min(shades, key=lambda s: abs(s - self._shade))
+
     def _believe(self, patch: Patch, place: Place, x: float, y: float) -> bool:
         look = self.look
         if not np.isfinite(place.x_px):
             return False
         ratio = place.contrast / look.contrast
         light = self._light(patch, place)
-        shades = [(place.contrast + place.wall) / light, place.contrast + place.wall]  # the light changed, or the wall
-        shade = min(abs(s - self._shade) for s in shades)
+        shade = abs(self._shade_now(patch, place) - self._shade)
         if np.isnan(place.wall):  # a localiser for bobs with a pattern, which show now this side, now that
             bright = 0.25 < ratio < 4.0
         elif np.isnan(shade) or self.hidden > 15:
@@ -225,7 +232,7 @@ class Follower(Known):
         """What the next frames are judged by."""
         self.hidden = 0
         self.recent.append((frame.t_s, place.x_px, place.y_px))
-        shade = (place.contrast + place.wall) / self._light(patch, place)
+        shade = self._shade_now(patch, place)
         if np.isnan(self._shade):
             self._shade = shade
         else:

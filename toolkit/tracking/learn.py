@@ -39,6 +39,7 @@ class Known:
         points = self._learn_stillness(batch, rough)
         self.found = {batch[i].index: p for i, p in points.items()}
         self._learn_background(batch, rough.look, points)
+        self.growth: tuple[float, ...] | None = None  # slope and intercept of the bob's radius along x
         self.look, self.exposure_s = self._learn_looks(batch, rough.look, points, radius)
         if self.look.noise > 0.2 * abs(self.look.contrast):
             # what else there is beside the bob (a shadow) was fitted too, unless it must stand out as none of it
@@ -167,6 +168,8 @@ class Known:
                         sizes[left].std() / np.sqrt(left.sum()), sizes[~left].std() / np.sqrt((~left).sum())
                     )
                     change = abs(sizes[left].mean() - sizes[~left].mean())
+                    where = np.array([points[numbers[k]][0] for k, f in zip(slow, found) if f is not None])
+                    self.growth = tuple(np.polyfit(where, sizes, 1)) if change > max(0.05, 4 * spread) else None
                     look = look._replace(radius_free=bool(change > max(0.05, 4 * spread)))
             if (
                 not look.even and look.noise > drawn
@@ -251,6 +254,13 @@ class Known:
     def _guess(self, x: float, y: float, bx: float, by: float) -> Guess:
         px, py = self.pivot or self.swing.pivot_px
         return Guess(x, y, bx, by, float(np.arctan2(py - y, px - x)))
+
+    def look_at(self, guess: Guess) -> Look:
+        """The bob's looks at a place: nearer to the camera it is larger."""
+        if self.growth is None or not self.look.radius_free:
+            return self.look
+        size = self.growth[0] * guess.x_px + self.growth[1]
+        return self.look._replace(radius_px=float(np.clip(size, 0.75 * self.look.radius_px, 1.3 * self.look.radius_px)))
 
     def _patch(self, frame: Frame, look: Look, guess: Guess, half: tuple[float, float] | None = None) -> Patch | None:
         """The patch about the guess, with the background behind it, in the pixels of a still camera; as large as the bob
