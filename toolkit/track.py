@@ -67,6 +67,11 @@ class Track:
         """(n,) bool: the frames on which the bob was measured."""
         return self.status == OK
 
+    def _repr_html_(self) -> str:
+        from toolkit.report.notebook import track_html
+
+        return track_html(self)
+
 
 def track(
     video_path: str | Path,
@@ -232,13 +237,13 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     misfit = float(np.median([p.misfit for p, g in zip(r.place, good) if g])) / max(abs(follower.look.contrast), 1.0)
     view: View | None = None
 
-    def _scatter(rx: np.ndarray, ry: np.ndarray) -> Factors:
+    def _scatter(rx: np.ndarray, ry: np.ndarray, rough: bool = False) -> Factors:
         v = swing.velocity(t[good])
-        known = shift.sigma[good], time_sigma, follower.shaking
-        return true_sigma((rx[good], ry[good]), (sx[good], sy[good]), v, *known)
+        known = shift.sigma[good], time_sigma
+        return true_sigma((rx[good], ry[good]), (sx[good], sy[good]), v, *known, rough)
 
     vx, vy = (np.hypot(v * time_sigma, shift.sigma) for v in swing.velocity(t))
-    scale = _scatter(x - mx, y - my)
+    scale = _scatter(x - mx, y - my, rough=True)
     for _ in range(2):  # error bars and the view of the camera each need the other
         found = fit_view(
             t[good] / fps_factor,

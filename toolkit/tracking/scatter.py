@@ -1,14 +1,13 @@
-"""How much a series scatters from frame to frame, and the factor that makes error bars agree with it."""
+"""How much a series scatters, and the factor that makes error bars agree with it."""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-_MOST = 3.0  # by how much a fit's own σ may be too small (noise that a codec has smeared)
-_WORST = 10.0  # beyond that it is no localiser's error
+_FITS = 2.5  # a motion fits where places stray from it by less than so many times their scatter from frame to frame
+_FREE = 9  # what a fitted motion has taken from the residuals of each axis
 
 
 class Factors(NamedTuple):
@@ -25,30 +24,46 @@ def true_sigma(
     velocity: tuple[np.ndarray, np.ndarray],
     shake_px: np.ndarray,
     time_sigma_s: float,
-    shaking: bool,
+    rough: bool = False,
 ) -> Factors:
-    """Make the fit's σ agree with the scatter of the residuals from frame to frame, all (n,) for x and y over the measured
-    frames, less what the shake and the clock are known to add. What bends slowly is no error of a frame but of the
-    motion assumed, and is taken out.
+    """Make the fit's σ agree with the residuals about a motion, all (n,) for x and y over the measured frames, less what the
+    shake and the clock are known to add.
 
-    Where the camera shakes, or no localiser is that bad, more than `_MOST` times the fit's σ is the shake's.
+    Where the motion fits, its residuals are the localiser's errors, slow ones too (a codec's, a shadow's). Where it does
+    not, what changes from frame to frame is the localiser's; the rest is a camera's shake as far as it is across the
+    motion, where no pendulum moves and no clock errs. About a `rough` motion, or where a shake was taken away, only what
+    changes from frame to frame tells of the localiser.
     """
     (rx, ry), (sx, sy), (vx, vy) = residuals, sigmas, velocity
     speed = np.hypot(vx, vy) + 1e-9
-    # the clock's error is along the motion: across it, the scatter is the localiser's own
-    across = (rx * vy - ry * vx) / speed, np.hypot(sx * vy, sy * vx) / speed, np.zeros_like(rx)
-    found = []
-    for r, s, v in ((rx, sx, vx), (ry, sy, vy), across):
+    ux, uy = vx / speed, vy / speed
+    across = rx * uy - ry * ux, np.hypot(sx * uy, sy * ux)
+    clock = vx * time_sigma_s, vy * time_sigma_s, np.zeros_like(speed)
+    found, fits = [], []
+    for (r, s), late in zip(((rx, sx), (ry, sy), across), clock):
+        known = float(np.mean((np.hypot(late, shake_px) / s) ** 2))
+        r = _tamed(r / s) * s  # a few pictures may be of another time
         square = scatter(r / s) ** 2
-        known = float(np.mean((np.hypot(v * time_sigma_s, shake_px) / s) ** 2))
-        found.append(np.sqrt(square - known) if square - known > 0.3 * square else np.nan)
+        near = square - known if square - known > 0.3 * square else np.nan
+        whole = float(np.mean((r / s) ** 2)) * r.size / max(r.size - _FREE, 1) - known
+        fits.append(whole <= _FITS**2 * near)
+        if rough or np.any(shake_px):
+            found.append(near)
+        else:
+            found.append(max(near, whole) if fits[-1] else min(near, scatter(r / s, 7) ** 2))
     factors = [f if np.isfinite(f) else found[2] if np.isfinite(found[2]) else 1.0 for f in found[:2]]
-    left = [0.0, 0.0]
-    for i, s in enumerate((sx, sy)):
-        if factors[i] > _MOST and (shaking or factors[i] > _WORST):
-            left[i] = float(np.sqrt(factors[i] ** 2 - _MOST**2) * np.median(s))
-            factors[i] = _MOST
-    return Factors(max(float(factors[0]), 0.5), max(float(factors[1]), 0.5), math.hypot(*left) / math.sqrt(2))
+    r, s = across
+    left = 0.0
+    if not rough and not fits[2] and np.isfinite(found[2]):
+        left = float(np.sqrt(max(np.mean(r**2) - found[2] * np.mean(s**2) - np.mean(shake_px**2), 0.0)))
+    x, y = (max(float(np.sqrt(f)), 0.5) for f in factors)
+    return Factors(x, y, left)
+
+
+def _tamed(r: np.ndarray) -> np.ndarray:
+    """The series with its strays drawn in to five of its robust standard deviation."""
+    most = 5 * 1.4826 * float(np.median(np.abs(r - np.median(r))))
+    return np.clip(r, np.median(r) - most, np.median(r) + most)
 
 
 def scatter(r: np.ndarray, width: int = 15) -> float:

@@ -1,0 +1,63 @@
+"""Error bars of places against scatter made up here, and the string found where it is only roughly thought to be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from toolkit.tracking.scatter import true_sigma
+from toolkit.tracking.string_line import measure_string, seen_half
+
+N = 400
+T = np.arange(N) / 60
+VX, VY = 500 * np.cos(5 * T), 120 * np.sin(10 * T)
+
+
+def factors(rx, ry, time_sigma=0.0, known=0.0):
+    one = np.ones(N)
+    return true_sigma((rx, ry), (0.02 * one, 0.02 * one), (VX, VY), known * one, time_sigma)
+
+
+def test_quick_and_slow_errors_of_a_localiser_both_count():
+    rng = np.random.default_rng(0)
+    quick = rng.normal(0, 0.03, (2, N))
+    slow = 0.03 * np.sqrt(2) * np.sin(1.3 * T)  # what a codec carries from frame to frame
+    found = factors(quick[0] + slow, quick[1])
+    assert found.x == pytest.approx(1.5 * np.sqrt(2), rel=0.1)
+    assert found.y == pytest.approx(1.5, rel=0.1)
+    assert found.shake_px == 0
+
+
+def test_a_shaking_camera_is_told_from_the_localiser_by_what_is_across_the_motion():
+    rng = np.random.default_rng(1)
+    quick = rng.normal(0, 0.03, (2, N))
+    shake = np.sin(np.outer([9.0, 11.0], T)) * np.sqrt(2)
+    found = factors(*(quick + shake))
+    assert (found.x, found.y) == (pytest.approx(1.5, rel=0.25), pytest.approx(1.5, rel=0.25))
+    assert found.shake_px == pytest.approx(1.0, rel=0.3)
+
+
+def test_a_clock_that_errs_or_a_drive_is_no_shake():
+    rng = np.random.default_rng(2)
+    quick = rng.normal(0, 0.03, (2, N))
+    late = 0.01 * np.sin(3 * T)
+    found = factors(quick[0] + VX * late, quick[1] + VY * late)
+    assert found.shake_px < 0.02
+    jitter = rng.normal(0, 3e-4, N)
+    found = factors(quick[0] + VX * jitter, quick[1] + VY * jitter, time_sigma=3e-4)
+    assert (found.x, found.y) == (pytest.approx(1.5, rel=0.25), pytest.approx(1.5, rel=0.25))
+
+
+@pytest.mark.parametrize("wrong_px", [0.0, -45.0, 45.0])
+def test_a_string_is_found_though_the_pivot_is_not_known_well(wrong_px):
+    cv2 = pytest.importorskip("cv2")
+    pivot, bob, radius = (190.0, 20.0), (240.0, 300.0), 15.0
+    wall = np.full((360, 480), 180.0, np.float32)
+    cv2.line(wall, tuple(round(16 * v) for v in pivot), tuple(round(16 * v) for v in bob), 90.0, 2, cv2.LINE_AA, 4)
+    luma = np.clip(wall + np.random.default_rng(3).normal(0, 2, wall.shape), 0, 255).astype(np.uint8)
+    line = measure_string(luma, bob, (pivot[0] + wrong_px, pivot[1]), radius)
+    truth = np.arctan2(bob[0] - pivot[0], bob[1] - pivot[1])
+    assert line is not None
+    assert line.angle_rad == pytest.approx(truth, abs=5 * line.sigma_angle_rad + 2e-4)
+    half = seen_half(np.hypot(line.x_px - bob[0], line.y_px - bob[1]), radius)
+    assert half == pytest.approx(0.5 * (np.hypot(280.0, 50.0) - 1.15 * radius - 10.0), abs=12.0)
