@@ -165,6 +165,7 @@ def _index_page(rows: list[BatchRow], lang: str) -> str:
 <link rel="icon" href="data:,"><style>
 {style}
 .failed td{{color:var(--bad)}}
+td:nth-child(3) span{{white-space:nowrap}}
 </style></head><body><main>
 <h1>{html.escape(title)}</h1>
 <p>{words("class.numbers", file='<a href="summary.csv">summary.csv</a>')}</p>

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from toolkit.checks.finding import Finding
     from toolkit.fit import FitResult, FittedParameter
 
+_EXPLAINED = 0.9
+"""Share of the angle's variance below which a reader is told that the model explains little."""
+
 MAIN = ("small_angle", "linear_drag")
 
 
@@ -198,7 +201,9 @@ def cautions(material: Material) -> tuple[str, ...]:
         for f in analysis.findings
         if f.verdict == "fails" and f.assumption not in (*MAIN, "white_residuals")
     ]
-    return tuple(failed + notes(material))[:3]
+    explained = material.explained
+    poor = [words("answer.explains_little", percent=percent(explained))] if explained < _EXPLAINED else []
+    return tuple(poor + failed + notes(material))[:3]
 
 
 def notes(material: Material) -> list[str]:

@@ -116,6 +116,13 @@ class Material:
         return float(self.cycles.amplitude_rad[0]), float(self.cycles.amplitude_rad[-1])
 
     @cached_property
+    def explained(self) -> float:
+        """Share of the angle's variance that the preferred model explains; 0 where it is not usable."""
+        if not self.usable:
+            return 0.0
+        return max(0.0, 1 - float(np.var(self.best.residuals_rad)) / (float(np.var(self.theta)) or 1.0))
+
+    @cached_property
     def sigma(self) -> float:
         """Scatter of a point about the preferred model, rad."""
         sigma = self.best.noise.get("sigma_rad")
