@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,7 @@ if TYPE_CHECKING:
     from toolkit.series import ThetaSeries
 
 
-@dataclass(frozen=True)
-class SolveCost:
+class SolveCost(NamedTuple):
     """What a solution cost: CPU seconds of the solve, of compiling (0 when cached), and evaluations made."""
 
     cpu_s: float = 0.0
@@ -60,11 +59,6 @@ class Trajectory:
 
         names = ("t_s", "theta_rad", "omega_rad_per_s", "tension_n", "energy_j")
         pd.DataFrame({name: getattr(self, name) for name in names}).to_csv(path, index=False)
-
-    def _repr_html_(self) -> str:
-        from toolkit.report.notebook import trajectory_html
-
-        return trajectory_html(self)
 
     @property
     def series(self) -> ThetaSeries:

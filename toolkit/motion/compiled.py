@@ -6,6 +6,7 @@ name is a hash of its content, and it is put in place by one rename: any number 
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import importlib.util
 import os
@@ -114,31 +115,35 @@ def terms(module: ModuleType) -> int:
 
 
 @cache
-def kernel(name: str, module: str = "", what: str = "") -> Callable[[int, None, int], int]:
-    """The function NAME of kernels/NAME.py, or of a `module`, as machine code: (scratch address, None, address of its
-    places) -> 0. `what` it is, for who waits."""
-    import ctypes
+def kernel(name: str) -> Callable[[int, None, int], int]:
+    """The function NAME of kernels/NAME.py as machine code: (scratch address, None, address of its places) -> 0."""
 
     def source() -> tuple[list[Any], Any, Any]:
         import importlib
 
         from toolkit.motion.kernels.pointer import WHOLES
 
-        return [WHOLES], False, getattr(importlib.import_module(module or f"toolkit.motion.kernels.{name}"), name)
+        return [WHOLES], False, getattr(importlib.import_module(f"toolkit.motion.kernels.{name}"), name)
 
     folder = Path(__file__).parent
-    files = [folder / "routes.py", *sorted((folder / "kernels").glob("*.py"))]
-    if module:
-        file = folder.parents[1].joinpath(*module.split(".")).with_suffix(".py")
-        files = [folder / "kernels" / "pointer.py", *sorted(file.parent.glob("_*.py"))]
-    texts = [file.read_bytes() for file in files]
-    address = machine_code(f"{name}_{key_of(*texts)}", source, what or "the equation of motion")
+    texts = [file.read_bytes() for file in (folder / "routes.py", *sorted((folder / "kernels").glob("*.py")))]
+    address = machine_code(f"{name}_{key_of(*texts)}", source)
     return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
 
 
-def machine_code(
-    name: str, source: Callable[[], tuple[list[Any], Any, Any]], what: str = "the equation of motion"
-) -> int:
+def address(array: Any) -> int:
+    """Where the numbers of a writable, contiguous array begin; four times as quick to ask as `array.ctypes.data`."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(array))
+
+
+def call(function: Callable[[int, None, int], int], *addresses: int) -> None:
+    """Call a kernel with these addresses as its places."""
+    places = (ctypes.c_int64 * (len(addresses) + 1))(*addresses)
+    at = ctypes.addressof(places)
+    function(at + 8 * len(addresses), None, at)
+
+
+def machine_code(name: str, source: Callable[[], tuple[list[Any], Any, Any]]) -> int:
     """The address of a function that Numba compiles now, or that was compiled before for a processor like this one.
 
     source : gives its argument types, fastmath flags and Python function; called only where nothing is on the disk. A
@@ -147,7 +152,7 @@ def machine_code(
     """
     if not keeps_objects:
         seen = cache_folder() / f"{name}.seen"
-        made = _compile(source, "" if seen.exists() else what, cache=True)
+        made = _compile(source, cache=True, tell=not seen.exists())
         seen.touch()
         _loaded.append(made)
         address: int = made._library.get_pointer_to_function(made.native_name.removeprefix("cfunc."))
@@ -156,7 +161,7 @@ def machine_code(
     path = cache_folder() / f"{name}_{processor.key}.o"
     found = processor.load(path, name)
     if found is None:
-        made = _compile(source, what)
+        made = _compile(source)
         _write(path, processor.emit(made.inspect_llvm(), made.native_name.removeprefix("cfunc."), name))
         found = processor.load(path, name)
     if found is None:
@@ -170,9 +175,9 @@ keeps_objects = sys.platform.startswith("linux")
 _loaded: list[Any] = []  # code must outlive its address
 
 
-def _compile(source: Callable[[], tuple[list[Any], Any, Any]], what: str, cache: bool = False) -> Any:
-    if what:
-        listener(f"compiling {what} (once; later runs find it ready)")
+def _compile(source: Callable[[], tuple[list[Any], Any, Any]], cache: bool = False, tell: bool = True) -> Any:
+    if tell:
+        listener("compiling the equation of motion (once; later runs find it ready)")
     import numba
 
     kinds, fastmath, function = source()
@@ -192,8 +197,6 @@ class _Processor:
         llvm.initialize_native_target()
         llvm.initialize_native_asmprinter()
         if os.name == "nt":  # elsewhere LLVM finds these in the process itself
-            import ctypes
-
             for name in _C_MATH:
                 llvm.add_symbol(name, ctypes.cast(getattr(ctypes.cdll.ucrtbase, name), ctypes.c_void_p).value)
         self.llvm = llvm

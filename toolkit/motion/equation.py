@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from ctypes import addressof, c_double
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from operator import itemgetter
@@ -19,6 +20,7 @@ from toolkit.effects.effect import Effect, Term
 from toolkit.effects.formula import formula_needs, formula_parameters
 from toolkit.errors import JobError, UsageError
 from toolkit.motion.blocks import blocks
+from toolkit.motion.compiled import address, call, kernel
 from toolkit.motion.solver import START, Solution, Solver
 from toolkit.motion.symbols import (
     SCENE_SYMBOLS,
@@ -105,20 +107,18 @@ class Equation:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tension (N) and energy (J) along a motion: as `terms_at`, without evaluating what does not enter them.
 
-        compiled : by machine code, where no effect but gravity and inertia enters.
+        compiled : by machine code, where no effect but gravity and inertia enters; θ and θ' must be writable.
         """
-        values = dict(zip(self.parameters, self.values(parameters)))
-        values["mass_kg"] = mass = parameters["mass_kg"]
-        length, g = values["length_m"], values["g_m_per_s2"]
-        tension, energy = np.empty(t_s.size), np.empty(t_s.size)
-        if compiled and not self._observed and not self.small_angle:
-            from toolkit.motion.compiled import kernel
-
-            numbers = np.array([mass * length, mass * g, mass * g * length, mass * length**2 / 2])
-            arrays = (np.array([t_s.size]), numbers, theta_rad, omega_rad_per_s, tension, energy)
-            places = np.array([array.__array_interface__["data"][0] for array in arrays] + [0])
-            kernel("observe")(places[-1:].ctypes.data, None, places.ctypes.data)
+        mass, length, g = parameters["mass_kg"], parameters["length_m"], parameters["g_m_per_s2"]
+        both = np.empty((2, t_s.size))
+        tension, energy = both
+        if compiled and t_s.size and not self._observed and not self.small_angle:
+            numbers = (c_double * 5)(t_s.size, mass * length, mass * g, mass * g * length, mass * length**2 / 2)
+            first, second = address(both), address(both) + both.strides[0]
+            call(kernel("observe"), addressof(numbers), address(theta_rad), address(omega_rad_per_s), first, second)
             return tension, energy
+        values = dict(zip(self.parameters, self.values(parameters)))
+        values["mass_kg"] = mass
         for part in blocks(t_s.size):
             t, theta, omega = t_s[part], theta_rad[part], omega_rad_per_s[part]
             square = omega * omega
@@ -269,10 +269,11 @@ class Equation:
         t = np.ascontiguousarray(t_s, dtype=float)
         asked = (self, accuracy_rad, tuple(sensitivities), start_s)
         known = getattr(_recent, "solver", None)
-        if known is None or _recent.asked != asked or not np.array_equal(t, known.t_s):
+        times = t.tobytes()
+        if known is None or _recent.asked != asked or times != _recent.times:
             # t is copied: whoever called may change it
             known = _recent.solver = Solver(self, t.copy(), accuracy_rad, asked[2], start_s, again=False)
-            _recent.asked = asked
+            _recent.asked, _recent.times = asked, times
         return known.solve(parameters, theta0_rad, omega0_rad_per_s)
 
     def index_of(self, name: str) -> int | None:

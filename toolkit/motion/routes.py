@@ -9,9 +9,9 @@ An integrator is given the addresses of eleven arrays, in this order:
     layout   where each row of the coefficient matrix starts; rows: F, F_θ, F_w, F_τ, sensitivities, error
     columns  the number of F's entries, then which basis function each entry belongs to
     values   the entries
-    numbers  fastest rate, θ, w, start, tolerance, then δθ, δw of each sensitivity at the start
-    t        scaled times, increasing, from the start on
-    out      to be filled: θ, w, then δθ, δw of each sensitivity, one row of samples each
+    numbers  fastest rate, θ, w, start, tolerance, units of time in a second, then δθ, δw of each sensitivity at the start
+    t        scaled times, increasing, from the start on, and seven numbers more
+    out      to be filled: θ, θ', then δθ, δθ' of each sensitivity, one row of samples each, θ' per second
     report   to be filled: status, steps, events, largest error, then (kind, τ, θ) of each event
     work     memory to work in
     table    the method's own numbers
@@ -27,7 +27,7 @@ import numpy as np
 
 ROW = 32  # Taylor coefficients kept of each basis function
 MAX_ORDER = ROW - 2
-BLOCK = 256  # samples at a time: they stay in the fastest cache
+SPARE = 24  # numbers of memory for samples that are still to be sorted
 MOST_EVENTS = 64
 DONE, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2
 
@@ -56,7 +56,7 @@ def taylor() -> Route:
     reciprocals = np.array([0.0] + [1.0 / k for k in range(1, ROW + 1)])
 
     def work_size(rows: int, k: int) -> int:
-        return 6 + BLOCK + ROW * (4 + 2 * (k + 1) + rows)
+        return 6 + SPARE + ROW * (4 + 2 * (k + 1) + rows)
 
     return Route("taylor", "Taylor series of order", reciprocals, work_size, 0, 0.025, 1e-17)
 
@@ -77,4 +77,6 @@ def rodas() -> Route:
     """Linearly implicit and L-stable, for strong damping."""
     from toolkit.motion.kernels.rodas_table import TABLE
 
-    return Route("rodas", "Rodas4, L-stable", TABLE, lambda rows, k: 4 + 12 + rows + 1, 7, 0.03, 1e-15, 200_000)
+    return Route(
+        "rodas", "Rodas4, L-stable", TABLE, lambda rows, k: 4 + 12 + rows + 1 + 2 * ROW + SPARE, 6, 0.1, 1e-15, 200_000
+    )

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from ctypes import addressof, c_double, c_int64
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from toolkit.errors import JobError, UsageError
 from toolkit.motion import routes
+from toolkit.motion.compiled import address
 from toolkit.trajectory import Event, SolveCost
 
 if TYPE_CHECKING:
@@ -22,11 +23,10 @@ START = ("theta0_rad", "omega0_rad_per_s")
 _NAMES_OF_EVENTS = ("stick", "slip")
 
 
-@dataclass(frozen=True)
-class Solution:
+class Solution(NamedTuple):
     """θ and θ' at the times asked for; d_theta and d_omega (n, k) are their derivatives by the k sensitivities.
 
-    `error_estimate_rad` is the estimated largest error of θ over the whole run, all steps' errors carried along.
+    A named tuple: a short solve takes little longer than making a frozen dataclass would. `error_estimate_rad` is the estimated largest error of θ over the whole run, all steps' errors carried along.
     """
 
     t_s: np.ndarray
@@ -89,33 +89,26 @@ class Solver:
 
     def integrate(self, p: tuple[float, ...], theta0: float, omega0: float) -> Solution:
         """The same by an integrator, whether or not there is an exact route."""
-        code = self.equation.code
         if p != self._parameters:
             self._resolve(p)
-        scale, accuracy = self._scale, self.accuracy_rad
-        start = (float(theta0), float(omega0) * scale)
+        start = (float(theta0), float(omega0) * self._scale)
         run = None
-        if self._may_be_stiff and self._is_stiff(start):
+        if self._may_be_stiff and (self._is_stiff or self._stiff_from(start)):
             run = self._run(routes.rodas(), start)
-            run = run if run is not None and run[1] <= accuracy else None
-        if run is None and code.ANALYTIC:
+            run = run if run is not None and run[1] <= self.accuracy_rad else None
+        if run is None and self.equation.code.ANALYTIC:
             run = self._run(routes.taylor(), start)
         if run is None:
             run = self._run(routes.dop853(), start)
         if run is None:
             raise JobError("the motion grows without bound or meets a singularity; check the effects' parameters")
         out, error, method, cost, events = run
-        if scale != 1.0:
-            out[1] *= 1.0 / scale
         d_theta = d_omega = self._none
         if self.sensitivities:
-            out[3::2] *= 1.0 / scale
             d_theta, d_omega = out[2::2].T, out[3::2].T
         warnings: tuple[str, ...] = ()
-        if not error <= accuracy:
-            text = (
-                f"asked for {accuracy:.1e} rad, the estimated error is {error:.1e} rad: the motion amplifies rounding"
-            )
+        if not error <= self.accuracy_rad:
+            text = f"asked for {self.accuracy_rad:.1e} rad, the estimated error is {error:.1e} rad: the motion amplifies rounding"
             warnings = (text,)
         return Solution(self.t_s, out[0], out[1], d_theta, d_omega, method, cost, error, events, warnings)
 
@@ -127,8 +120,9 @@ class Solver:
             self._scale, self._by_route = scale, {}
         self._coefficients = code.coefficients(p, scale)
         self._may_be_stiff = bool(not self.sensitivities and code.ROWS[2] and not code.HOLDS)
+        self._is_stiff = False
         if self._may_be_stiff and code.JACOBIAN_LENGTHS[1] == 1:  # the same for every start
-            self._may_be_stiff = self._is_stiff((0.0, 1.0))
+            self._may_be_stiff = self._is_stiff = self._stiff_from((0.0, 1.0))
         self._parameters = p
         for work in self._by_route.values():
             work.resolve(p, self._coefficients)
@@ -141,7 +135,7 @@ class Solver:
             self._by_route[route.kernel] = work
         return work.run(start)
 
-    def _is_stiff(self, start: tuple[float, float]) -> bool:
+    def _stiff_from(self, start: tuple[float, float]) -> bool:
         """Does the velocity decay so much faster than the motion that an explicit method would crawl?"""
         code, coefficients = self.equation.code, self._coefficients
         basis, begin = [0.0] * code.N_BASIS, self.start_s / self._scale
@@ -152,6 +146,13 @@ class Solver:
         first = code.N_INNER + len(code.ROWS[0]) + len(code.ROWS[1])
         decay = -sum([coefficients[first + i] * basis[column] for i, column in enumerate(code.ROWS[2])])
         return decay > 30 and decay * (float(self.t_s[-1]) / self._scale - begin) > 3000
+
+
+def _wholes(*numbers: int) -> Any:
+    return (c_int64 * len(numbers))(*numbers)
+
+
+_OUT_OF_KERNEL = 11  # the place after the eleven arrays: where a kernel's empty result goes
 
 
 class _Work:
@@ -171,32 +172,39 @@ class _Work:
         self.accuracy, self.again = solver.accuracy_rad, solver.again
         layout, columns, self.take = solver.equation.layout(names)
         rows = code.N_WORK if is_series else code.N_BASIS
-        self.sizes = np.array(
-            [rows, *code.JACOBIAN_LENGTHS, code.SWITCHES, code.HOLDS, code.TIMED, k, solver.t_s.size, 0,
-             route.most_steps, address, further], dtype=np.int64,
+        count = solver.t_s.size
+        tau = np.zeros(count + 7)  # vectors of eight may reach beyond the last one
+        tau[:count] = solver.t_s / scale
+        self.sizes = _wholes(
+            rows, *code.JACOBIAN_LENGTHS, code.SWITCHES, code.HOLDS, code.TIMED, k, count, 0,
+            route.most_steps, address, further,
         )  # fmt: skip
-        tau = solver.t_s / scale
-        self.q = np.zeros(n_coefficients + len(self.take) + 1)
-        self.numbers = np.array([0.0, 0.0, 0.0, solver.start_s / scale, 0.0] + [0.0] * (2 * k))
+        self.q = (c_double * (n_coefficients + len(self.take)))()
+        self.numbers = (c_double * (6 + 2 * k))(0.0, 0.0, 0.0, solver.start_s / scale, 0.0, 1.0 / scale)
         for i, name in enumerate(names):
-            self.numbers[5 + 2 * i : 7 + 2 * i] = float(name == START[0]), scale if name == START[1] else 0.0
-        self.shape = (2 + 2 * k, tau.size)
-        self.report, memory = np.empty(4 + 3 * routes.MOST_EVENTS), np.empty(route.work_size(rows, k))
+            self.numbers[6 + 2 * i] = float(name == START[0])
+            self.numbers[7 + 2 * i] = scale if name == START[1] else 0.0
+        self.shape = (2 + 2 * k, count)
+        self.report = (c_double * (4 + 3 * routes.MOST_EVENTS))()
         self.loosest = route.first * self.accuracy
-        self.first = max(self.loosest / (1.0 + 0.3 * float(tau[-1] - self.numbers[3])), route.floor)
-        arrays = (
-            self.sizes, self.q, layout, columns, self.q[code.N_INNER :], self.numbers, tau, tau, self.report, memory,
-            route.table,
-        )  # fmt: skip
+        span = 1.0 + 0.3 * float(tau[count - 1] - self.numbers[3]) if is_series or route.stages > 6 else 1.0
+        self.first, self.settled = max(self.loosest / span, route.floor), False
+        arrays = (layout, columns, tau, np.empty(route.work_size(rows, k)), route.table)
         self.kept = arrays  # in memory, while their addresses are used
-        self.places = np.array([array.ctypes.data for array in arrays] + [0], dtype=np.int64)
-        self.at, self.scratch = self.places.ctypes.data, self.places[-1:].ctypes.data
+        at_layout, at_columns, at_tau, at_memory, at_table = (array.ctypes.data for array in arrays)
+        at_q = addressof(self.q)
+        self.places = _wholes(
+            addressof(self.sizes), at_q, at_layout, at_columns, at_q + 8 * code.N_INNER, addressof(self.numbers), at_tau, 0,
+            addressof(self.report), at_memory, at_table, 0,
+        )  # fmt: skip
+        self.at = addressof(self.places)
+        self.scratch = self.at + 8 * _OUT_OF_KERNEL
 
     def resolve(self, p: tuple[float, ...], coefficients: tuple[float, ...]) -> None:
-        self.q[: len(coefficients)] = coefficients
+        self.q[: len(coefficients)] = list(coefficients)
         if self.take:
             partials = self.code.partials(p, self.scale)
-            self.q[len(coefficients) : -1] = [partials[i] for i in self.take]
+            self.q[len(coefficients) :] = [partials[i] for i in self.take]
         self.numbers[0] = self.code.fastest_rate(p, self.scale)
 
     def run(self, start: tuple[float, float]) -> tuple[np.ndarray, float, str, SolveCost, tuple[Event, ...]] | None:
@@ -205,23 +213,25 @@ class _Work:
         route, numbers, accuracy = self.route, self.numbers, self.accuracy
         numbers[1], numbers[2] = start
         out = np.empty(self.shape)
-        self.places[7] = out.__array_interface__["data"][0]
+        self.places[7] = address(out)
         evaluations = total = 0
-        tolerance = self.first
+        tolerance = began_with = self.first
         for _attempt in range(6):
-            order = 0 if route.stages else min(max(int(4.0 - 0.75 * math.log(tolerance)), 6), routes.MAX_ORDER)
+            order = 0 if route.stages else min(max(int(4.0 - 0.8 * math.log(tolerance)), 6), routes.MAX_ORDER)
             self.sizes[8], numbers[4] = order, tolerance
             self.integrate(self.scratch, None, self.at)
-            status, steps, found, error = self.report[:4].tolist()
+            status, steps, found, error = self.report[:4]
             total += int(steps)
             evaluations += int(steps) * (route.stages or order)
             if status != routes.DONE or error <= accuracy or tolerance <= route.floor:
                 break
             tolerance = max(tolerance * 0.3 * accuracy / error, route.floor)
         if self.again:
-            self.first = (
-                max(min(tolerance * 0.3 * accuracy / error, self.loosest), route.floor) if error > 0.0 else tolerance
-            )
+            self.first = tolerance
+            if tolerance != began_with:
+                self.settled = True  # a looser one has failed
+            elif 0.0 < error < 0.1 * accuracy and not self.settled:
+                self.first = max(min(tolerance * 0.3 * accuracy / error, self.loosest), route.floor)
         if status == routes.TOO_MANY_STEPS and route.kernel != "rodas":
             raise JobError(
                 f"the equation needs more than {route.most_steps} steps; shorten the time or soften the stiffest effect"
@@ -230,7 +240,7 @@ class _Work:
             return None
         events: tuple[Event, ...] = ()
         if found:
-            triples = self.report[4 : 4 + 3 * int(found)].reshape(-1, 3).tolist()
+            triples = zip(*[iter(self.report[4 : 4 + 3 * int(found)])] * 3)
             events = tuple(Event(_NAMES_OF_EVENTS[int(kind)], t * self.scale, angle) for kind, t, angle in triples)
         cost = SolveCost(time.process_time() - began, self.compile_s, evaluations, total)
         self.compile_s = 0.0

@@ -13,7 +13,7 @@ from numba import njit
 
 from toolkit.motion.kernels import dop853_table
 from toolkit.motion.kernels.friction import held_until, leave_rest
-from toolkit.motion.kernels.pointer import call_terms, reals, skip, wholes
+from toolkit.motion.kernels.pointer import call_terms, skip, unpack
 from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, TOO_MANY_STEPS
 
 _WIDE, _E = dop853_table.A.shape[1], dop853_table.D.shape[1]
@@ -62,22 +62,13 @@ def _stages(
 
 def dop853(places: Any) -> None:
     """Fill `out` and `report`: see `routes`; `address` is that of the equation's terms."""
-    sizes = wholes(places, 0)
-    q = reals(places, 1)
-    layout = wholes(places, 2)
-    columns = wholes(places, 3)
-    values = reals(places, 4)
-    numbers = reals(places, 5)
-    t = reals(places, 6)
-    out = reals(places, 7)
-    report = reals(places, 8)
-    work = reals(places, 9)
-    table = reals(places, 10)
+    sizes, q, layout, columns, values, numbers, t, out, report, work, table = unpack(places)
     address = sizes[10]
     switches = sizes[3]
     count = sizes[7]
     m = 4 + 2 * sizes[6]
     tolerance = numbers[4]
+    per_second = numbers[5]
     s = work
     B = skip(s, 4)
     y = skip(B, sizes[0] + 1)
@@ -86,7 +77,7 @@ def dop853(places: Any) -> None:
     K = skip(fresh, m)
     P = skip(K, 16 * m)
     for d in range(m):
-        y[d] = numbers[3 + d] if 1 < d < m - 2 else 0.0
+        y[d] = numbers[4 + d] if 1 < d < m - 2 else 0.0
     y[0] = numbers[1]
     y[1] = numbers[2]
     now = numbers[3]
@@ -102,7 +93,7 @@ def dop853(places: Any) -> None:
         if held:
             while i < count and t[i] <= until:
                 for d in range(m - 2):
-                    out[d * count + i] = y[d]
+                    out[d * count + i] = y[d] * (per_second if d % 2 else 1.0)
                 i += 1
             held = False
         if i >= count:
@@ -209,7 +200,7 @@ def dop853(places: Any) -> None:
                     v = 0.0
                     for r in range(6, -1, -1):
                         v = (v + P[r * m + d]) * (part if r % 2 == 0 else 1.0 - part)
-                    out[d * count + i] = y[d] + v
+                    out[d * count + i] = (y[d] + v) * (per_second if d % 2 else 1.0)
                 i += 1
         now += h
         for d in range(m):

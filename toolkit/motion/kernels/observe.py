@@ -6,7 +6,7 @@ from typing import Any
 
 from numba import njit
 
-from toolkit.motion.kernels.pointer import reals, wholes
+from toolkit.motion.kernels.pointer import reals
 
 _PI_HIGH, _PI_LOW = 3.141592653589793, 1.2246467991473532e-16
 _ROUNDER = 6755399441055744.0  # 1.5·2⁵²: adding it leaves no digits after the point
@@ -14,7 +14,7 @@ _ROUNDER = 6755399441055744.0  # 1.5·2⁵²: adding it leaves no digits after t
 
 @njit(fastmath={"contract"})
 def _observe(n: int, p: Any, theta: Any, omega: Any, tension: Any, energy: Any) -> None:
-    swing, weight, lift, half = p[0], p[1], p[2], p[3]
+    swing, weight, lift, half = p[1], p[2], p[3], p[4]
     for i in range(n):
         y = 0.5 * theta[i]
         turns = (y * (1.0 / _PI_HIGH) + _ROUNDER) - _ROUNDER
@@ -39,6 +39,6 @@ def _observe(n: int, p: Any, theta: Any, omega: Any, tension: Any, energy: Any) 
 
 
 def observe(places: Any) -> None:
-    """places: count; mℓ, mg, mgℓ, I/2; θ, ω; tension and energy, to be filled."""
-    count = wholes(places, 0)
-    _observe(count[0], reals(places, 1), reals(places, 2), reals(places, 3), reals(places, 4), reals(places, 5))
+    """places: (count, mℓ, mg, mgℓ, I/2); θ, ω; tension and energy, to be filled."""
+    p = reals(places, 0)
+    _observe(int(p[0]), p, reals(places, 1), reals(places, 2), reals(places, 3), reals(places, 4))

@@ -8,12 +8,11 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir  # type: ignore[import-untyped]
-from numba import types
+from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 REALS, WHOLES = types.CPointer(types.float64), types.CPointer(types.int64)
-_PIXELS = types.CPointer(types.float32)
 
 
 def _at(kind: Any, places: Any) -> Any:
@@ -37,15 +36,18 @@ def wholes(typing: Any, places: Any, number: Any) -> Any:
 
 
 @intrinsic
-def pixels(typing: Any, places: Any, number: Any) -> Any:
-    """The array of float32 whose address is the numbered one of `places`."""
-    return _at(_PIXELS, places)
-
-
-@intrinsic
 def skip(typing: Any, pointer: Any, count: Any) -> Any:
     """The pointer `count` elements further on."""
     return pointer(pointer, types.int64), lambda context, builder, _, values: builder.gep(values[0], [values[1]])
+
+
+@njit
+def unpack(places: Any) -> Any:
+    """The eleven arrays of an integrator, in the order of `routes`."""
+    return (
+        wholes(places, 0), reals(places, 1), wholes(places, 2), wholes(places, 3), reals(places, 4), reals(places, 5),
+        reals(places, 6), reals(places, 7), reals(places, 8), reals(places, 9), reals(places, 10),
+    )  # fmt: skip
 
 
 def _call(builder: Any, values: Any) -> Any:

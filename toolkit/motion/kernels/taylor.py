@@ -17,8 +17,10 @@ from typing import Any
 from numba import njit
 
 from toolkit.motion.kernels.friction import held_until, leave_rest
-from toolkit.motion.kernels.pointer import call_jet, reals, skip, wholes
-from toolkit.motion.routes import BLOCK, DONE, MOST_EVENTS, NOT_FINITE, ROW, TOO_MANY_STEPS
+from toolkit.motion.kernels.pointer import call_jet, skip, unpack
+from toolkit.motion.kernels.sampling import sample_step
+from toolkit.motion.kernels.vector import evaluate_8
+from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, ROW, SPARE, TOO_MANY_STEPS
 
 _SAFETY = 15.0  # near the separatrix the plain estimate has been up to 13 times too small (benchmarks/integrators.py accuracy)
 
@@ -32,38 +34,35 @@ def _value(c: Any, n: int, x: float) -> float:
 
 
 @njit(fastmath={"contract"})
-def _slope(c: Any, n: int, x: float) -> float:
-    v = n * c[n]
+def _ahead(c: Any, n: int, h: float) -> tuple[float, float, float]:
+    """(θ(h) − θ(0))/h, the same of w, and w'(h), all at once; w lies a row after θ."""
+    w = skip(c, ROW)
+    theta, slope, v = c[n], 0.0, w[n]
     for k in range(n - 1, 0, -1):
-        v = v * x + k * c[k]
-    return v
-
-
-@njit(fastmath={"contract"})
-def _sample(c: Any, n: int, x: Any, count: int, out: Any) -> None:
-    """Values of one series at x[0] … x[count − 1]; the inner loops run over samples, side by side."""
-    top, k = c[n], n
-    for j in range(count):
-        out[j] = top
-    while k >= 4:
-        a, b, d, e = c[k - 1], c[k - 2], c[k - 3], c[k - 4]
-        for j in range(count):
-            y = x[j]
-            out[j] = (((out[j] * y + a) * y + b) * y + d) * y + e
-        k -= 4
-    while k >= 1:
-        a = c[k - 1]
-        for j in range(count):
-            out[j] = out[j] * x[j] + a
-        k -= 1
+        theta = theta * h + c[k]
+        slope = slope * h + v
+        v = v * h + w[k]
+    return theta, v, slope * h + v
 
 
 @njit
-def _turning_point(w: Any, n: int, h: float, sign: float, x: Any) -> tuple[float, bool]:
+def _power(x: float, n: int) -> float:
+    result = 1.0
+    while n > 0:
+        if n & 1:
+            result *= x
+        x *= x
+        n >>= 1
+    return result
+
+
+@njit
+def _turning_point(c: Any, n: int, h: float, sign: float, x: Any) -> tuple[float, bool]:
     """The first time in (0, h] where sign·w falls below 0 (or −1), and whether w is against `sign` from the start.
 
-    x : room for 16 numbers.
+    c : the row of θ, before that of w.    x : room for SPARE numbers.
     """
+    w = skip(c, ROW)
     rest, power = 0.0, 1.0
     for k in range(2, n + 1):
         power *= h
@@ -72,10 +71,10 @@ def _turning_point(w: Any, n: int, h: float, sign: float, x: Any) -> tuple[float
         return -1.0, False
     if w[0] == 0.0 and abs(w[1]) > rest:  # leaves rest and does not come back
         return -1.0, sign * w[1] < 0.0
-    v = skip(x, 8)
+    v = skip(x, 16)
     for i in range(8):
         x[i] = h * (i + 1) / 8.0
-    _sample(w, n, x, 8, v)
+    evaluate_8(c, n, x, 0.0, 0.0, skip(x, 8), 8, 1.0)
     left, before = 0.0, w[0]
     for i in range(8):
         if sign * v[i] < 0.0:
@@ -147,19 +146,25 @@ def _variational(J: Any, by_theta: int, by_w: int, D: Any, F: Any, n: int, R: An
         E[k + 1] = (v + u) * R[k + 1]
 
 
+@njit(fastmath={"contract"})
+def _carry(J: Any, by_theta: int, by_w: int, D: Any, n: int, R: Any) -> None:
+    """The same of an error, which nothing forces; in few terms, for which plain loops are quickest."""
+    K, E = skip(J, ROW), skip(D, ROW)
+    for k in range(n):
+        v = u = 0.0
+        if by_theta != 0:
+            for j in range(k + 1 if by_theta == 2 else 1):
+                v += J[j] * D[k - j]
+        if by_w != 0:
+            for j in range(k + 1 if by_w == 2 else 1):
+                u += K[j] * E[k - j]
+        D[k + 1] = E[k] * R[k + 1]
+        E[k + 1] = (v + u) * R[k + 1]
+
+
 def taylor(places: Any) -> None:
     """Fill `out` and `report`: see `routes`; `address` is that of the equation's jet."""
-    sizes = wholes(places, 0)
-    q = reals(places, 1)  # inner constants, then the coefficients of F
-    layout = wholes(places, 2)
-    columns = wholes(places, 3)
-    values = reals(places, 4)
-    numbers = reals(places, 5)
-    t = reals(places, 6)
-    out = reals(places, 7)
-    report = reals(places, 8)
-    work = reals(places, 9)
-    R = reals(places, 10)
+    sizes, q, layout, columns, values, numbers, t, out, report, work, R = unpack(places)
     address = sizes[10]
     by_theta = sizes[1]
     by_w = sizes[2]
@@ -170,17 +175,18 @@ def taylor(places: Any) -> None:
     count = sizes[7]
     n = sizes[8]
     tolerance = numbers[4]
+    per_second = numbers[5]
     s = work  # the present time, θ, w and its sign
     lost = skip(work, 4)  # what the last sums of θ and w lost
     x = skip(lost, 2)
-    F = skip(x, BLOCK)
+    F = skip(x, SPARE)
     J = skip(F, ROW)
     D = skip(J, 2 * ROW)  # rows: δθ, δw of each sensitivity, then error of θ, of w
     error = skip(D, 2 * k_sens * ROW)
     W = skip(error, 2 * ROW)
     w_row = skip(W, ROW)
     for a in range(2 * k_sens):
-        D[a * ROW] = numbers[5 + a]
+        D[a * ROW] = numbers[6 + a]
     error[0] = error[ROW] = lost[0] = lost[1] = 0.0
     s[1] = numbers[1]
     s[2] = numbers[2]
@@ -198,7 +204,7 @@ def taylor(places: Any) -> None:
         if held:
             while i < count and t[i] <= until:
                 for a in range(2 + 2 * k_sens):
-                    out[a * count + i] = s[1 + a] if a < 2 else D[(a - 2) * ROW]
+                    out[a * count + i] = (s[1 + a] if a < 2 else D[(a - 2) * ROW]) * (per_second if a % 2 else 1.0)
                 i += 1
             held = False
         if i >= count:
@@ -254,11 +260,11 @@ def taylor(places: Any) -> None:
             break
         turned = False
         if switches != 0:
-            root, against = _turning_point(w_row, n, h, sign, x)
+            root, against = _turning_point(W, n, h, sign, x)
             if against:
                 sign = s[3] = -sign
                 call_jet(address, q, s, W, R, n)
-                root, against = _turning_point(w_row, n, h, sign, x)
+                root, against = _turning_point(W, n, h, sign, x)
             if root >= 0.0:
                 h = root
                 turned = True
@@ -274,24 +280,11 @@ def taylor(places: Any) -> None:
         for a in range(2):  # F_θ, F_w
             length = (n if k_sens > 0 else rough) if sizes[1 + a] == 2 else 1
             _combine(W, skip(columns, 1), values, layout[1 + a], layout[2 + a], length, skip(J, a * ROW))
-        for a in range(k_sens + 1):  # the last one is the error, which nothing forces
-            length = n if a < k_sens else rough
-            _combine(W, skip(columns, 1), values, layout[4 + a], layout[5 + a], length, F)
-            _variational(J, by_theta, by_w, skip(D, 2 * a * ROW), F, length, R)
-        while i < count:  # samples inside this step
-            some = 0
-            while some + 8 <= BLOCK and i + some + 8 <= count and (t[i + some + 7] - hi) - lo <= h:
-                some += 8
-            while some < BLOCK and i + some < count and (t[i + some] - hi) - lo <= h:
-                some += 1
-            if some == 0:
-                break
-            for j in range(some):
-                x[j] = (t[i + j] - hi) - lo
-            for a in range(2 + 2 * k_sens):
-                series = skip(W, a * ROW) if a < 2 else skip(D, (a - 2) * ROW)
-                _sample(series, n, x, some, skip(out, a * count + i))
-            i += some
+        for a in range(k_sens):
+            _combine(W, skip(columns, 1), values, layout[4 + a], layout[5 + a], n, F)
+            _variational(J, by_theta, by_w, skip(D, 2 * a * ROW), F, n, R)
+        _carry(J, by_theta, by_w, error, rough, R)
+        i = sample_step(t, i, count, hi, lo, h, W, D, k_sens, n, out, per_second, x)
         # the next state, with what the last sums lost
         change = h + lo
         new = hi + change
@@ -299,9 +292,8 @@ def taylor(places: Any) -> None:
         hi = new
         for a in range(2 * k_sens + 2):
             D[a * ROW] = _value(skip(D, a * ROW), n if a < 2 * k_sens else rough, h)
-        power = 0.3 * _SAFETY
-        for _ in range(n - 1):
-            power *= h
+        power = 0.3 * _SAFETY * _power(h, n - 1)
+        change_theta, change_w, slope = _ahead(W, n, h)
         seed = (seed * 1103515245 + 12345) % 2147483648
         rounding = 2.2e-16 if seed < 1073741824 else -2.2e-16  # rounding errors add like a random walk, but …
         always = 0.0  # … those of the coefficients and of the drive's phase ω τ have the same sign at every step
@@ -312,7 +304,7 @@ def taylor(places: Any) -> None:
         error[ROW] += math.copysign(h * always, error[ROW])
         for a in range(2):
             series = skip(W, a * ROW)
-            change = h * _value(skip(series, 1), n - 1, h) + lost[a]
+            change = h * (change_theta if a == 0 else change_w) + lost[a]
             new = series[0] + change
             lost[a] = change - (new - series[0])
             s[1 + a] = new
@@ -320,7 +312,6 @@ def taylor(places: Any) -> None:
             error[a * ROW] += math.copysign(counted, error[a * ROW]) + rounding * abs(new)
         worst = max(worst, abs(error[0]))
         passed = 0.0 if turned else h
-        slope = _slope(w_row, n, h)
         if turned:
             s[2] = lost[1] = 0.0
             resting = True

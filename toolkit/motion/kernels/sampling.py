@@ -1,0 +1,45 @@
+"""The samples that lie inside a step, read off the step's series."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+from toolkit.motion.kernels.pointer import skip
+from toolkit.motion.kernels.vector import evaluate_8, evaluate_16
+from toolkit.motion.routes import ROW
+
+
+@njit
+def sample_step(
+    t: Any, i: int, count: int, hi: float, lo: float, h: float, first: Any, others: Any, pairs: int, n: int,
+    out: Any, factor: float, spare: Any,
+) -> int:  # fmt: skip
+    """Fill `out` from sample i on for the times up to hi + lo + h, and give the first sample beyond.
+
+    first : the series of θ, and a row on that of θ'; others : `pairs` more such pairs. n : their order. spare : room for
+    16 numbers. Behind the last time there must be seven numbers more that may be read.
+    """
+    stop = i
+    while stop + 16 <= count and (t[stop + 15] - hi) - lo <= h:
+        stop += 16
+    while stop < count and (t[stop] - hi) - lo <= h:
+        stop += 1
+    for a in range(pairs + 1):
+        series = skip(others, 2 * (a - 1) * ROW) if a > 0 else first
+        row = skip(out, 2 * a * count)
+        j = i
+        while j + 16 <= stop:
+            evaluate_16(series, n, skip(t, j), hi, lo, skip(row, j), count, factor)
+            j += 16
+        while j < stop:
+            if j + 8 <= stop:
+                evaluate_8(series, n, skip(t, j), hi, lo, skip(row, j), count, factor)
+            else:
+                evaluate_8(series, n, skip(t, j), hi, lo, spare, 8, factor)
+                for m in range(stop - j):
+                    row[j + m] = spare[m]
+                    row[count + j + m] = spare[8 + m]
+            j += 8
+    return stop
