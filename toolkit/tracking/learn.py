@@ -10,6 +10,7 @@ from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch
 from toolkit.tracking.acquire import Rough, cut, scattered
 from toolkit.tracking.background import Background
 from toolkit.tracking.search import still_picture
+from toolkit.tracking.sight import LUMA
 from toolkit.tracking.stillness import STILL, Anchors, CameraShift
 from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Frame
@@ -113,9 +114,9 @@ class Known:
         self.back.fill_gaps((x0, y0, x1, y1))
         beyond = np.ones(self.shape, bool)  # where the bob was not found (yet) the picture is what stands still
         beyond[y0:y1, x0:x1] = False
-        still = still_picture(
-            [self.sight.window(batch[i], 0, 0, self.shape[1], self.shape[0]) for i in scattered(len(batch), 5)]
-        )
+        few = [batch[i] for i in scattered(len(batch), 5)]
+        plain = self.sight.weights == LUMA
+        still = still_picture([f.luma if plain else self.sight.window(f, 0, 0, *self.shape[::-1]) for f in few])
         np.copyto(self.back.mean, still, where=beyond)
         self.back.seen[beyond] = 1.0
 
