@@ -59,6 +59,12 @@ _WORDS = {
         "all": "ดาวน์โหลดทั้งหมด (zip)",
         "working": "กำลังทำงาน…",
         "trouble": "เกิดข้อผิดพลาดที่ไม่คาดคิด",
+    },
+}
+
+_STAGES: dict[str, dict[str, str]] = {
+    "en": {},
+    "th": {
         "searching": "กำลังหาลูกตุ้ม",
         "tracking": "กำลังติดตามลูกตุ้ม",
         "compiling the equations, this once": "กำลังคอมไพล์สมการ (ครั้งแรกครั้งเดียว)",
@@ -67,6 +73,7 @@ _WORDS = {
         "writing the overlay": "กำลังเขียนวิดีโอซ้อนภาพ",
     },
 }
+"""What the work says it is doing, where a language has its own words for it."""
 
 
 @dataclass
@@ -138,7 +145,7 @@ def _content(visit: _Visit, lang: str) -> None:
 
         def show_stage() -> None:
             stage, bar.value = visit.stage
-            text.text = words.get(stage, stage) or words["working"]
+            text.text = _STAGES[lang].get(stage, stage) or words["working"]
 
         timer = ui.timer(0.2, show_stage)
         try:
