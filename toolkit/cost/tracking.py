@@ -27,7 +27,7 @@ from toolkit.scene import Scene
 LUMA = np.array([0.299, 0.587, 0.114])  # BT.601
 LUMA_SCALE = 219 / 255  # of the limited range that video files use
 OURS, PEER = "ours", "peer"
-WHOLE = "whole run"
+WHOLE, ALONE = "whole run", "localiser"
 _LONGEST_S = 4.0  # of CPU for one follower on one clip: the slow ones see fewer frames
 _COLUMNS = (
     "clip", "method", "kind", "rms_x_px", "rms_y_px", "spread_px", "std_of_error_over_sigma", "ok_fraction",
@@ -105,7 +105,7 @@ def measure_tracking(quick: bool = False, progress: Progress = silent) -> list[R
                 tell(f"{clip.name}: {name}")
                 results += _run_ours(film, name, truth, common, warm=number == 0)
             keep = [frame.copy() for frame in _lumas(open_video(film))]
-            runs = {f"{name} localiser": localiser(name, clip.scene, truth) for name in tracker_names()}
+            runs = {f"{name} {ALONE}": localiser(name, clip.scene, truth) for name in tracker_names()}
             for name, prepare in {**runs, **PEERS}.items():
                 tell(f"{clip.name}: {name}")
                 results += _run_follower(name, OURS if name in runs else PEER, prepare, keep, truth, common)
@@ -261,7 +261,7 @@ def _run_follower(
     if near.mean() < 0.2:
         return []
     return [
-        _result(name, PEER, dx[near], dy[near], math.nan, near.sum() / len(path), 1e6 * seconds / len(path), common)
+        _result(name, kind, dx[near], dy[near], math.nan, near.sum() / len(path), 1e6 * seconds / len(path), common)
     ]
 
 
@@ -298,55 +298,70 @@ def describe(results: list[Result], quick: bool) -> str:
     return "\n".join(lines).rstrip()
 
 
-def _plain(value: float, position: int) -> str:
-    return f"{value:g}"
-
-
 def _draw(results: list[Result], path: Path) -> None:
+    """A panel a clip: our localisers in colours (full: the whole run, hollow: alone), peers in grey."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
-    from matplotlib.ticker import LogLocator
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    names = list(dict.fromkeys(r.clip for r in results))
-    columns = min(3, len(names))
-    rows = math.ceil(len(names) / columns)
-    figure = Figure(figsize=(4.6 * columns, 3.9 * rows + 0.5), layout="constrained")
+    clips = list(dict.fromkeys(r.clip for r in results))
+    columns = min(3, len(clips))
+    rows = math.ceil(len(clips) / columns)
+    figure = Figure(figsize=(4.4 * columns, 3.7 * rows + 0.9), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
-    methods = list(dict.fromkeys(r.method for r in results))
-    marks = "osDv^<>Pp*hX"
-    colours = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999933", "#882255")
-    for panel, clip in zip(panels, names):
-        group = [r for r in results if r.clip == clip]
-        for r in group:
-            total = _with_decoding(r)
-            i = methods.index(r.method)
-            panel.loglog(
-                total / 1e3, math.hypot(r.rms_x_px, r.rms_y_px) / math.sqrt(2), marks[i % len(marks)],
-                color=colours[i % len(colours)], markersize=9 if r.kind == OURS else 7,
-                markerfacecolor=None if r.kind == OURS else "white", label=r.method,
-            )  # fmt: skip
-        panel.axhline(group[0].bound_px, color="0.4", linestyle="--", linewidth=1)
-        panel.text(0.98, group[0].bound_px * 1.06, "Cramér–Rao bound", ha="right", fontsize=8, color="0.35",
-                   transform=panel.get_yaxis_transform())  # fmt: skip
-        panel.axvline(group[0].decode_us_per_frame / 1e3, color="0.4", linestyle=":", linewidth=1)
-        panel.text(group[0].decode_us_per_frame / 1e3 / 1.15, 0.5, "decoding alone", va="center", rotation=90, fontsize=8,
-                   color="0.35", transform=panel.get_xaxis_transform())  # fmt: skip
-        panel.xaxis.set_major_formatter(_plain)
-        panel.xaxis.set_minor_formatter("")
-        low = min(_with_decoding(r) for r in group) / 1e3
-        panel.set_xlim(min(low, group[0].decode_us_per_frame / 1e3) / 1.5, None)
+    ours = list(
+        dict.fromkeys(r.method.rsplit(" ", 1 + (r.method.endswith(WHOLE)))[0] for r in results if r.kind == OURS)
+    )
+    colour = dict(zip(ours, ("#009E73", "#E69F00", "#0072B2", "#D55E00", "#CC79A7", "#56B4E9", "#882255")))
+    mark = dict(zip(dict.fromkeys(r.method for r in results if r.kind == PEER), "sD^vPX*"))
+    plain = FuncFormatter(lambda value, _: f"{value:g}")
+    for panel, clip in zip(panels, clips):
+        group = {r.method: r for r in results if r.clip == clip}
+
+        def at(r: Result) -> tuple[float, float]:
+            return _with_decoding(r) / 1e3, math.hypot(r.rms_x_px, r.rms_y_px) / math.sqrt(2)
+
+        for name in ours:
+            pair = [group[m] for m in (f"{name} {ALONE}", f"{name} {WHOLE}") if m in group]
+            panel.plot(*zip(*map(at, pair)), color=colour[name], linewidth=0.8, alpha=0.6, zorder=2)
+            for r in pair:
+                whole = r.method.endswith(WHOLE)
+                panel.plot(*at(r), "o", color=colour[name], markersize=8, markeredgewidth=1.6,
+                           markerfacecolor=colour[name] if whole else "white", zorder=4 if whole else 3)  # fmt: skip
+        for name in mark:
+            if name in group:
+                panel.plot(*at(group[name]), mark[name], color="0.45", markersize=7, zorder=3)
+        some = next(iter(group.values()))
+        panel.axhline(some.bound_px, color="0.2", linestyle="--", linewidth=1, zorder=1)
+        panel.axvline(some.decode_us_per_frame / 1e3, color="0.2", linestyle=":", linewidth=1, zorder=1)
+        panel.annotate("Cramér–Rao bound", (1, some.bound_px), (-4, 3), xycoords=("axes fraction", "data"),
+                       textcoords="offset points", ha="right", fontsize=8, color="0.2")  # fmt: skip
+        panel.annotate("decoding alone", (some.decode_us_per_frame / 1e3, 1), (-4, -4), xycoords=("data", "axes fraction"),
+                       textcoords="offset points", ha="right", va="top", rotation=90, fontsize=8, color="0.2")  # fmt: skip
+        panel.set(xscale="log", yscale="log", title=clip)
+        panel.set_xlim(some.decode_us_per_frame / 1e3 / 1.7, None)
         panel.xaxis.set_major_locator(LogLocator(10, (1, 2, 5)))
-        panel.set_title(clip, fontsize=10)
-        panel.set_xlabel("CPU time a frame, decoding included (ms)")
-        panel.grid(True, which="both", color="0.92")
-    for panel in panels[len(names) :]:
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.set_major_formatter(plain)
+        panel.grid(True, which="major", color="0.9", zorder=0)
+    for panel in panels[len(clips) :]:
         panel.set_visible(False)
+    for panel in panels[max(0, len(clips) - columns) : len(clips)]:
+        panel.set_xlabel("CPU time a frame, decoding included (ms)")
     for panel in panels[::columns]:
         panel.set_ylabel("rms error per axis (px)")
-    handles = {
-        h.get_label(): h for panel in panels for h in panel.get_lines() if not str(h.get_label()).startswith("_")
-    }
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=min(4, len(handles)), fontsize=9)
+    key = [
+        Line2D([], [], marker="o", linestyle="", color=colour[name], label=f"ours: {name.replace('_', ' ')}")
+        for name in ours
+    ]
+    key += [
+        Line2D([], [], marker="o", linestyle="", color="0.2", markerfacecolor=face, label=label)
+        for face, label in (("0.2", "whole run, search included"), ("white", "localiser alone, helped as peers are"))
+    ]
+    key += [Line2D([], [], marker=mark[name], linestyle="", color="0.45", label=name) for name in mark]
+    figure.legend(handles=key, loc="outside lower center", ncols=4 if columns > 1 else 2, fontsize=9, frameon=False)
     for suffix in (".png", ".svg"):
         figure.savefig(path.with_suffix(suffix), dpi=130)
