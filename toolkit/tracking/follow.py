@@ -144,8 +144,8 @@ class Follower(Known):
         if close is None:
             return place, patch, False
         other = self._locate(close, near)
-        px, py = self.pivot or self.swing.pivot_px
-        off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - np.hypot(guess.x_px - px, guess.y_px - py))
+        px, py = self.swing.pivot_px
+        off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - self.swing.length_px)
         alike = other.visible >= min(0.9, self.ordinary_visible + 0.05) and 0.6 < other.contrast / look.contrast < 1.6
         on_arc = off_arc < 0.5 * look.radius_px + 2 + 2 * self.swing.rms_px
         if alike and on_arc and self._believe(close, other, near.x_px, near.y_px):
