@@ -7,6 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 _FITS = 2.5  # a motion fits where places stray from it by less than so many times their scatter from frame to frame
+_CLOCK = 3.0  # by how much a localiser may be worse along the motion than across it
+_MOST, _WORST = (
+    3.0,
+    10.0,
+)  # what a fit's own σ may be wrong by in a bad clip; beyond the second it is not the localiser's
 _FREE = 9  # what a fitted motion has taken from the residuals of each axis
 
 
@@ -51,12 +56,13 @@ def true_sigma(
             found.append(near)
         else:
             found.append(max(near, whole) if fits[-1] else min(near, scatter(r / s, 7) ** 2))
-    factors = [f if np.isfinite(f) else found[2] if np.isfinite(found[2]) else 1.0 for f in found[:2]]
+    own = found[2] if np.isfinite(found[2]) else 1.0
+    factors = [f if f <= _CLOCK**2 * own else own for f in found[:2]]  # the rest is the clock's
     r, s = across
     left = 0.0
     if not rough and not fits[2] and np.isfinite(found[2]):
         left = float(np.sqrt(max(np.mean(r**2) - found[2] * np.mean(s**2) - np.mean(shake_px**2), 0.0)))
-    x, y = (max(float(np.sqrt(f)), 0.5) for f in factors)
+    x, y = (max(float(np.sqrt(f)), 0.5) if f < _WORST**2 else _MOST for f in factors)
     return Factors(x, y, left)
 
 
