@@ -9,6 +9,7 @@ from toolkit.tracking.follow import Record
 from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Video
 
+_LEFT_OUT = 0.12  # so many frames at another time than their stamp, left out, leave a clock that is sound else
 _PLACED = 0.01  # of the swing's extent: how far places may still stray where lost frames are placed
 
 
@@ -82,7 +83,7 @@ def out_of_time(
         )
     leap &= ~repeats
     if leap.any():  # a few are left out and done with; many mean a clock that cannot be trusted
-        (log if leap.mean() < 0.05 else warnings).append(
+        (log if leap.mean() < _LEFT_OUT else warnings).append(
             said(
                 "track.leaps",
                 "{frames} frame(s) show the bob at another time than their stamp says (a camera that drops or repeats frames), "
