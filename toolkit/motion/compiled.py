@@ -115,19 +115,23 @@ def terms(module: ModuleType) -> int:
 
 
 @cache
-def kernel(name: str) -> Callable[[int, None, int], int]:
-    """The function NAME of kernels/NAME.py as machine code: (scratch address, None, address of its places) -> 0."""
+def kernel(name: str, module: str = "", what: str = "") -> Callable[[int, None, int], int]:
+    """The function NAME of kernels/NAME.py, or of a `module`, as machine code: (scratch address, None, address of its
+    places) -> 0. `what` it is, for who waits."""
 
     def source() -> tuple[list[Any], Any, Any]:
         import importlib
 
         from toolkit.motion.kernels.pointer import WHOLES
 
-        return [WHOLES], False, getattr(importlib.import_module(f"toolkit.motion.kernels.{name}"), name)
+        return [WHOLES], False, getattr(importlib.import_module(module or f"toolkit.motion.kernels.{name}"), name)
 
     folder = Path(__file__).parent
-    texts = [file.read_bytes() for file in (folder / "routes.py", *sorted((folder / "kernels").glob("*.py")))]
-    address = machine_code(f"{name}_{key_of(*texts)}", source)
+    files = [folder / "routes.py", *sorted((folder / "kernels").glob("*.py"))]
+    if module:
+        files = [folder / "kernels" / "pointer.py", folder.parents[1].joinpath(*module.split(".")).with_suffix(".py")]
+    texts = [file.read_bytes() for file in files]
+    address = machine_code(f"{name}_{key_of(*texts)}", source, what or "the equation of motion")
     return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
 
 
@@ -143,7 +147,9 @@ def call(function: Callable[[int, None, int], int], *addresses: int) -> None:
     function(at + 8 * len(addresses), None, at)
 
 
-def machine_code(name: str, source: Callable[[], tuple[list[Any], Any, Any]]) -> int:
+def machine_code(
+    name: str, source: Callable[[], tuple[list[Any], Any, Any]], what: str = "the equation of motion"
+) -> int:
     """The address of a function that Numba compiles now, or that was compiled before for a processor like this one.
 
     source : gives its argument types, fastmath flags and Python function; called only where nothing is on the disk. A
@@ -152,7 +158,7 @@ def machine_code(name: str, source: Callable[[], tuple[list[Any], Any, Any]]) ->
     """
     if not keeps_objects:
         seen = cache_folder() / f"{name}.seen"
-        made = _compile(source, cache=True, tell=not seen.exists())
+        made = _compile(source, "" if seen.exists() else what, cache=True)
         seen.touch()
         _loaded.append(made)
         address: int = made._library.get_pointer_to_function(made.native_name.removeprefix("cfunc."))
@@ -161,7 +167,7 @@ def machine_code(name: str, source: Callable[[], tuple[list[Any], Any, Any]]) ->
     path = cache_folder() / f"{name}_{processor.key}.o"
     found = processor.load(path, name)
     if found is None:
-        made = _compile(source)
+        made = _compile(source, what)
         _write(path, processor.emit(made.inspect_llvm(), made.native_name.removeprefix("cfunc."), name))
         found = processor.load(path, name)
     if found is None:
@@ -175,9 +181,9 @@ keeps_objects = sys.platform.startswith("linux")
 _loaded: list[Any] = []  # code must outlive its address
 
 
-def _compile(source: Callable[[], tuple[list[Any], Any, Any]], cache: bool = False, tell: bool = True) -> Any:
-    if tell:
-        listener("compiling the equation of motion (once; later runs find it ready)")
+def _compile(source: Callable[[], tuple[list[Any], Any, Any]], what: str, cache: bool = False) -> Any:
+    if what:
+        listener(f"compiling {what} (once; later runs find it ready)")
     import numba
 
     kinds, fastmath, function = source()

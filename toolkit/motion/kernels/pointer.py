@@ -13,6 +13,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 REALS, WHOLES = types.CPointer(types.float64), types.CPointer(types.int64)
+_PIXELS = types.CPointer(types.float32)
 
 
 def _at(kind: Any, places: Any) -> Any:
@@ -33,6 +34,12 @@ def reals(typing: Any, places: Any, number: Any) -> Any:
 def wholes(typing: Any, places: Any, number: Any) -> Any:
     """The array of int64 whose address is the numbered one of `places`."""
     return _at(WHOLES, places)
+
+
+@intrinsic
+def pixels(typing: Any, places: Any, number: Any) -> Any:
+    """The array of float32 whose address is the numbered one of `places`."""
+    return _at(_PIXELS, places)
 
 
 @intrinsic
