@@ -129,7 +129,8 @@ def kernel(name: str, module: str = "", what: str = "") -> Callable[[int, None, 
     folder = Path(__file__).parent
     files = [folder / "routes.py", *sorted((folder / "kernels").glob("*.py"))]
     if module:
-        files = [folder / "kernels" / "pointer.py", folder.parents[1].joinpath(*module.split(".")).with_suffix(".py")]
+        file = folder.parents[1].joinpath(*module.split(".")).with_suffix(".py")
+        files = [folder / "kernels" / "pointer.py", *sorted(file.parent.glob("_*.py"))]  # one kernel may use another
     texts = [file.read_bytes() for file in files]
     address = machine_code(f"{name}_{key_of(*texts)}", source, what or "the equation of motion")
     return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
