@@ -148,6 +148,29 @@ def test_the_first_page_answers_the_five_questions(analysis, english):
     assert all(v.figure is not None for v in english.verdicts)
 
 
+def test_the_first_page_gives_the_budgets_combined_uncertainty(analysis):
+    free = analysed(analysis.series, Scene(pendulum=Pendulum(mass_kg=MASS)))
+    report = build_report(free, "en")
+    captions = [bare(b.caption) for s in report.sections if s.key == "budget" for b in s.blocks if hasattr(b, "rows")]
+    for question in ("question.period", "question.length"):
+        shown = re.search(r"\([\d.]+ ± [\d.]+\) (?:s|m)", answer(report, question))[0]
+        assert any(shown in caption for caption in captions), shown
+    alone = next(p for p in (free.best.derived | free.best.parameters).items() if p[0] == "equivalent_length")[1].stderr
+    told = float(re.search(r"± ([\d.]+)", answer(report, "question.length"))[1])
+    assert told > 3 * alone  # nobody gave g
+
+
+def test_a_reader_of_the_first_page_is_warned(analysis, english):
+    assert english.cautions == ("The table wobbled.",)
+    rubs = next(f for f in analysis.findings if f.assumption not in ("small_angle", "linear_drag", "white_residuals"))
+    report = build_report(replace(analysis, findings=[*analysis.findings, replace(rubs, verdict="fails")]), "en")
+    assert report.cautions[0].startswith("**")
+    assert report.cautions[-1] == "The table wobbled."
+    t = np.arange(300) / 30
+    noise = ThetaSeries(t, np.random.default_rng(3).normal(0, 0.01, t.size))
+    assert any("explains only" in line for line in build_report(analysed(noise, Scene()), "en").cautions)
+
+
 def test_without_a_mass_no_k_d_is_claimed(analysis):
     report = build_report(replace(analysed(record(seconds=12), Scene())), "en")
     drag = answer(report, "question.drag")
@@ -549,13 +572,54 @@ def test_results_print_themselves(analysis):
         assert parser.found == []
     assert "k<sub>d</sub>" in shown[1]
     assert "5 of 6 frames measured by the disc localiser" in shown[-1]
-    assert "50 points to t = 2 s" in bare(shown[-2])
+    assert "50 points to t = 2.000 s" in shown[-2]
     lines = summary_lines(analysis)
     assert any("k_d" in line for line in lines)
     assert not any("{" in line or "\n" in line for line in lines)
 
 
 # -- what figures do to data ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_ticks_are_matplotlibs_own(scale):
+    """The same numbers at the same places as matplotlib writes by itself."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Sheet
+
+    from toolkit.report.ticks import draw_ticks
+
+    def drawn():
+        sheet = Sheet(figsize=(4, 3))
+        axes = sheet.subplots()
+        axes.plot([0.3, 7.1], [2, 5000])
+        axes.set_yscale(scale)
+        axes.minorticks_off()
+        FigureCanvasAgg(sheet).draw()
+        return axes
+
+    plain, ours = drawn(), drawn()
+    draw_ticks(ours)
+    for axis, k in ((plain.xaxis, 0), (plain.yaxis, 1)):
+        low, high = axis.get_view_interval()
+        wanted = {label.get_text(): label.get_position()[k] for label in axis.get_majorticklabels()}
+        wanted = {text: place for text, place in wanted.items() if low <= place <= high}
+        ours_here = [
+            text for text in ours.texts if text.get_ha() == ("center", "right")[k] and text.get_text() in wanted
+        ]
+        shown = {text.get_text(): text.get_position()[k] for text in ours_here}
+        assert wanted
+        assert shown == pytest.approx(wanted)
+
+
+def test_figures_that_fit_share_a_line(english):
+    from toolkit.report.paper import lines, width_percent
+
+    blocks = [b for s in english.sections for b in s.blocks]
+    rows = lines(blocks)
+    assert [b for row in rows for b in row] == blocks
+    assert ["energy", "portrait"] in [[b.key for b in row] for row in rows if hasattr(row[0], "svg") and len(row) > 1]
+    assert all(sum(map(width_percent, row)) <= 100.5 for row in rows if len(row) > 1)
 
 
 @given(st.integers(1, 20000), st.integers(1, 2000))

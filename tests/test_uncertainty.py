@@ -81,6 +81,15 @@ def test_tension_and_energy_are_physics():
     assert band.energy_j[0] > band.energy_j[-1] > 0
 
 
+def test_bands_at_other_times_are_the_same_motion():
+    result = fitted()
+    at_points, t_s = bands(result), result.problem.series.t_s
+    again = bands(result, t_s[::7])
+    for name in ("theta_rad", "sigma_theta_rad", "tension", "sigma_energy", "energy_j", "sigma_tension_n"):
+        assert np.allclose(getattr(again, name), getattr(at_points, name)[::7], rtol=1e-6, atol=1e-12), name
+    assert np.allclose(at_points.tension_n, 0.05 * 9.80665 * at_points.tension)
+
+
 def test_budget_adds_up_and_sensitivities_are_known():
     table = budget(fitted(), "k_d", {"mass": Input(0.001, "rectangular"), "time_scale": Input(1e-4), "g": Input(0.01)})
     k_d = fitted().parameters["k_d"]

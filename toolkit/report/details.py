@@ -198,4 +198,4 @@ def references(material: Material) -> Section:
     kind = str(material.analysis.series.meta.get("format", "")).lower()
     used += [key for key in ("tracker", "phyphox") if key in kind]
     items = tuple(words(f"reference.{key}") for key in used)
-    return Section("references", words("section.references"), (Paragraph(words("text.references"), items),))
+    return Section("references", words("section.references"), (Paragraph("", items),))
