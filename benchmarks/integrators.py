@@ -89,10 +89,11 @@ def report_accuracy(chosen: argparse.Namespace) -> None:
 def report_sensitivities(chosen: argparse.Namespace) -> None:
     """Derivatives of θ against differences of whole-number solutions, largest error relative to the largest derivative."""
     for problem in problems():
-        if problem.name not in ("P1", "P3", "P5", "D"):
+        if problem.name not in ("P1", "P3", "P4", "P5", "D"):
             continue
-        duration = min(problem.duration_s, 20.0)
-        short = replace(problem, duration_s=duration, samples=201)
+        duration, samples = (2.0, 21) if problem.stiff else (20.0, 201)
+        duration = min(problem.duration_s, duration)
+        short = replace(problem, duration_s=duration, samples=samples)
         equation = scene_equation(short.scene)
         values = scene_parameters(short.scene, equation)
         names = [n for n in equation.parameters if n != "cosine_drive.phase_rad"] + ["theta0_rad", "omega0_rad_per_s"]

@@ -60,6 +60,11 @@ class Trajectory:
         names = ("t_s", "theta_rad", "omega_rad_per_s", "tension_n", "energy_j")
         pd.DataFrame({name: getattr(self, name) for name in names}).to_csv(path, index=False)
 
+    def _repr_html_(self) -> str:
+        from toolkit.report.notebook import trajectory_html
+
+        return trajectory_html(self)
+
     @property
     def series(self) -> ThetaSeries:
         """The same θ(t) as a `ThetaSeries` without error bars."""

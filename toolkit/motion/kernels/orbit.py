@@ -16,10 +16,11 @@ TERMS = 9
 @njit(fastmath={"contract"})
 def _orbit(n: int, points: int, p: Any, t: Any, series: Any, theta: Any, omega: Any) -> None:
     period, lost, phase0, direction, turns, over = p[0], p[1], p[2], p[3], p[4], p[5]
+    per_second = direction / period
     for i in range(n):
         count = (t[i] * (1.0 / period) + _ROUNDER) - _ROUNDER
         now = (t[i] - count * period) - count * lost
-        phase = phase0 + direction * (now / period)
+        phase = phase0 + now * per_second
         more = (phase + _ROUNDER) - _ROUNDER
         x = (phase - more) * points
         near = (x + _ROUNDER) - _ROUNDER
@@ -30,7 +31,7 @@ def _orbit(n: int, points: int, p: Any, t: Any, series: Any, theta: Any, omega: 
             d = d * x + v
             v = v * x + c[k]
         theta[i] = v + over * _TURN * (direction * count + more) + turns
-        omega[i] = d * (direction * points / period)
+        omega[i] = d * (points * per_second)
 
 
 def orbit(places: Any) -> None:
