@@ -240,7 +240,13 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     def _scatter(rx: np.ndarray, ry: np.ndarray, rough: bool = False) -> Factors:
         v = swing.velocity(t[good])
         known = shift.sigma[good], time_sigma
-        return true_sigma((rx[good], ry[good]), (sx[good], sy[good]), v, *known, rough)
+        found = true_sigma((rx[good], ry[good]), (sx[good], sy[good]), v, *known, rough)
+        if not follower.shaking:
+            return found
+        # the picture's own places hold the shake, but not the error with which it was measured
+        shaken = (rx + shift.x)[good], (ry + shift.y)[good]
+        own = true_sigma(shaken, (sx[good], sy[good]), v, 0 * shift.sigma[good], time_sigma)
+        return Factors(min(found.x, own.x), min(found.y, own.y), found.shake_px)
 
     vx, vy = (np.hypot(v * time_sigma, shift.sigma) for v in swing.velocity(t))
     scale = _scatter(x - mx, y - my, rough=True)
