@@ -95,7 +95,7 @@ def _profile(material: Material, result: Any, first: str, second: str) -> Contou
 
     if result.problem is None or material.t.size > _MOST_POINTS:
         return None
-    found = contour(result, first, second, reach=3.0, count=13)
+    found = contour(result, first, second, reach=2.8, count=9)
     return found if np.isfinite(found.delta_chi2).mean() > 0.5 else None
 
 
