@@ -111,11 +111,15 @@ class Follower(Known):
         return self.localiser.locate(patch, look, guess)
 
     def _locate_uneven(self, patch: Patch, guess: Guess) -> Place:
-        """A bob with a pattern: its silhouette says about where; the localiser, how exactly, if it agrees."""
+        """A bob with a pattern: the localiser, where it sees enough of the outline; else its silhouette says about where, and the
+        localiser, if it agrees, how exactly."""
         look = self.look
+        sure = self.localiser.locate(patch, look, guess)
+        if sure.visible >= self.ordinary_visible and 0.25 < sure.contrast / look.contrast < 4.0:
+            return sure
         found = self._outline_in(patch, 0.45)
         if found is None:
-            return self.localiser.locate(patch, look, guess)
+            return sure
         x, y, share = found
         place = self.localiser.locate(patch, look, guess._replace(x_px=x, y_px=y))
         believed = {"misfit": self.ordinary_misfit, "visible": min(1.0, share / 0.6), "contrast": look.contrast}

@@ -220,7 +220,8 @@ class Known:
                 continue
             t, x, y, misfit, visible = np.array(found).T
             swing = fit_swing(t, x, y, np.full(t.size, 0.1), restarted(self.swing, t[0]))
-            favour = 0.9 if name == "disc" and self.look.even else 1.0
+            # a pattern draws the disc fit along with its turning, slowly: a swing fitted to so few frames hides some of that
+            favour = 1.0 if name != "disc" else 0.9 if self.look.even else 1.3
             if swing is not None and swing.rms_px * favour < least:
                 best, least = candidate, swing.rms_px * favour
                 self.ordinary_misfit = float(np.percentile(misfit, 90))
