@@ -327,10 +327,11 @@ class _Problem:
             weight = np.exp(log_weight - log_weight.max())
             if turn and 1 / np.sum((weight / weight.sum()) ** 2) > _ENOUGH:
                 break
-            soft = weight
-            while 1 / np.sum((soft / soft.sum()) ** 2) < 3 * len(bent):  # too few count: those near count too
-                soft = np.sqrt(soft)
-            soft = soft / soft.sum()
+            soft, power = weight / weight.sum(), 1.0
+            while 1 / np.sum(soft**2) < 3 * len(bent) and power > 1e-4:  # too few count: those near count too
+                power /= 2
+                soft = np.exp(power * (log_weight - log_weight.max()))
+                soft /= soft.sum()
             middle = soft @ draws
             off = (draws - middle)[:, bent]
             spread = (off * soft[:, None]).T @ off
