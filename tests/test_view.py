@@ -181,3 +181,19 @@ def test_frames_are_not_placed_where_more_is_amiss():
     t, _ = place_lost_frames(stamps, x, y, swing, good, np.zeros(300, bool), warned)
     np.testing.assert_array_equal(t, stamps)
     assert [w.key for w in warned] in ([], ["track.clock_slips"])
+
+
+def test_draws_of_which_hardly_one_counts_come_to_an_end(monkeypatch):
+    """First draws a thousand times too wide: nearly all weights are zero to the last digit."""
+    from toolkit.tracking import view_fit
+
+    narrow = view_fit._Problem.sample
+
+    def wide(problem, modes):
+        return narrow(problem, [mode._replace(normal=1e-6 * mode.normal) for mode in modes])
+
+    monkeypatch.setattr(view_fit._Problem, "sample", wide)
+    view, _, _ = seen(perspective={"yaw_rad": 0.15})
+    if view is not None:  # too few that count is an honest end too
+        assert np.isfinite(view.weights).all()
+        assert view.weights.sum() == pytest.approx(1)

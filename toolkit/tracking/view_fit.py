@@ -324,6 +324,8 @@ class _Problem:
             target = np.where(np.isfinite(target), target, -np.inf)
             shares = np.log(np.array(counts)[:, None]) + np.array([b.log_density(draws[:, bent]) for b in bells])
             log_weight = target - np.logaddexp.reduce(shares, axis=0)
+            if not np.isfinite(log_weight.max()):
+                raise np.linalg.LinAlgError("no draw lies where the data allow one")
             weight = np.exp(log_weight - log_weight.max())
             if turn and 1 / np.sum((weight / weight.sum()) ** 2) > _ENOUGH:
                 break
