@@ -197,3 +197,28 @@ def test_draws_of_which_hardly_one_counts_come_to_an_end(monkeypatch):
     if view is not None:  # too few that count is an honest end too
         assert np.isfinite(view.weights).all()
         assert view.weights.sum() == pytest.approx(1)
+
+
+def test_a_repeated_picture_near_a_turning_point_is_left_out():
+    """The bob stands where it was one frame before: half a pixel off, too little for a leap, far too much for chance."""
+    from types import SimpleNamespace
+
+    from toolkit.tracking.clock import out_of_time
+
+    t = np.arange(240) / 60
+    rng = np.random.default_rng(8)
+    angle = 0.4 * np.cos(4.1 * t)
+    x, y = 320 + 400 * np.sin(angle), 20 + 400 * np.cos(angle)
+    x, y = x + rng.normal(0, 0.02, t.size), y + rng.normal(0, 0.02, t.size)
+    speed = np.hypot(np.gradient(x), np.gradient(y))
+    slow = [int(k) for k in np.flatnonzero((speed > 0.6) & (speed < 2.4))[2::5]]
+    assert len(slow) > 2
+    for k in slow:
+        x[k], y[k] = x[k - 1], y[k - 1]
+    swing = fit_swing(t, x, y, np.full(t.size, 0.1), start_swing(t, x, y))
+    assert swing is not None
+    mx, my = swing.position(t)
+    seen_again = SimpleNamespace(repeated=[False] * t.size)
+    left_out = out_of_time(seen_again, t, x - mx, y - my, swing, np.ones(t.size, bool), [], [])
+    assert set(slow) <= set(np.flatnonzero(left_out).tolist())
+    assert left_out.sum() <= len(slow) + 2

@@ -69,8 +69,10 @@ def out_of_time(
     near = _running_median(along, good)
     noise = 1.4826 * float(np.median(np.abs((along - near)[good]))) + 1e-3
     step = float(np.median(np.diff(t))) * speed
-    leap = good & (step > max(6 * noise, 0.3 * float(step.max())))
-    leap &= (np.abs(along - near) > np.maximum(8 * noise, 0.5 * step)) & (np.abs(across) < 4 * noise + 0.5 * step)
+    off = along - near
+    again = np.abs(off + step) < 4 * noise + 0.2 * step  # where the bob was one frame before
+    leap = good & (step > 6 * noise) & (again | (step > 0.3 * float(step.max())))
+    leap &= (np.abs(off) > np.maximum(8 * noise, 0.5 * step)) & (np.abs(across) < 4 * noise + 0.5 * step)
     repeats = np.array(r.repeated) & (step > 4 * noise) & good
     if repeats.any():
         log.append(

@@ -343,7 +343,9 @@ class _Problem:
         keep = weight > 1e-4
         v, weight = draws[keep], weight[keep] / weight[keep].sum()
         normal = modes[0].normal[np.ix_(follows, follows)]
-        v[:, follows] += rng.multivariate_normal(np.zeros(len(follows)), np.linalg.inv(normal), len(v))
+        v[:, follows] += rng.multivariate_normal(
+            np.zeros(len(follows)), np.linalg.inv(normal), len(v), check_valid="ignore"
+        )
         return v, weight
 
 
