@@ -16,7 +16,7 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
-from toolkit.tracking.clock import even_times, out_of_time, place_lost_frames
+from toolkit.tracking.clock import clock_slips, even_times, out_of_time, place_lost_frames
 from toolkit.tracking.follow import Follower
 from toolkit.tracking.scatter import Factors, true_sigma
 from toolkit.tracking.shake import Shake
@@ -271,6 +271,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         before, scale = scale, _scatter(x - mx, y - my)
         if not view.shown or min(scale.x / before.x, scale.y / before.y) > 0.6:
             break
+    if view is not None and not clock_slips(t, x - mx, y - my, swing, good):  # what tilt or lens explain is no slip
+        warnings = [w for w in warnings if getattr(w, "key", "") != "track.clock_slips"]
     sigma = np.hypot(shift.sigma, scale.shake_px)
     sx, sy = sx * scale.x, sy * scale.y
     rms_px = float(np.sqrt(0.5 * np.mean((x - mx)[good] ** 2 + (y - my)[good] ** 2)))
