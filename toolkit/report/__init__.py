@@ -29,12 +29,10 @@ def check_choice(formats: Sequence[str], lang: str) -> None:
 
 
 def import_ahead(formats: Sequence[str]) -> None:
-    """Import what fits, figures and writers need beside the measuring, which mostly waits for decoders and machine code."""
+    """Import what figures and writers need beside the measuring, which mostly waits for decoders and machine code."""
     from threading import Thread
 
     needed = [
-        "lmfit",
-        "toolkit.diagnose",
         "toolkit.report.build",
         "matplotlib.backends.backend_svg",
         "matplotlib.font_manager",
