@@ -116,7 +116,7 @@ def place_lost_frames(
     when: list[float] = []
     for _ in range(6):
         mx, my = swing.position(t)
-        slips = clock_slips(t, x - mx, y - my, swing, good)
+        slips = _for_good(clock_slips(t, x - mx, y - my, swing, good))
         lost = [(k, f) for k, f in slips if f > 0 or (f > -1.3 and repeated[max(0, k - 1) : k + 1].any())]
         odd = len(slips) - len(lost)
         if not lost:
@@ -197,6 +197,13 @@ def clock_slips(
         # cameras that lose a frame may be late with the next: what is no whole number is taken as it is
         slips.append((int(chosen[exact]), whole if abs(size - whole) < 0.03 + 3 * off[exact] else size))
         sharp[near] = False
+
+
+def _for_good(slips: list[tuple[int, float]]) -> list[tuple[int, float]]:
+    """Without leaps by part of a frame that a later one takes back: a camera loses whole frames, and for good."""
+    parts = [(k, f) for k, f in slips if f != round(f)]
+    undone = {p for i, a in enumerate(parts) for b in parts[i + 1 :] if abs(a[1] + b[1]) < 0.1 for p in (a, b)}
+    return [p for p in slips if p not in undone]
 
 
 def _running_median(values: np.ndarray, good: np.ndarray, half: int = 7) -> np.ndarray:
