@@ -77,12 +77,12 @@ def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float 
     candidates, samples = _hypotheses(batch, bob, radius, colour=False)
     moved = bool(candidates)
     best = _likeliest(batch, candidates, samples, radius, repeated)
-    if best is None or len(best.points) < _MOST * (len(batch) - len(repeated)) or not _even(best.look):
+    if best is None or len(best.points) < _MOST * (len(batch) - len(repeated)) or not is_even(best.look):
         still = still_picture([batch[i].luma for i in scattered(len(batch))])
         movers = [c for c in _movers_before(batch, still, samples, radius) if bob is None]
         moved = moved or bool(movers)
-        for silhouette, extra in ((False, [*candidates, *movers]), (True, [*movers, *candidates])):
-            other = _likeliest(batch, extra, samples, radius, repeated, Stage(still, silhouette))
+        for alike, extra in ((False, [*candidates, *movers]), (True, [*movers, *candidates])):
+            other = _likeliest(batch, extra, samples, radius, repeated, Stage(still, alike))
             if other is not None and (best is None or _weight(batch, other, still) > _weight(batch, best, still)):
                 best = other
     if best is None:
@@ -136,7 +136,7 @@ def _weight(batch: list[Frame], rough: Rough, still: np.ndarray) -> float:
     return rough.score * float(np.median(shares)) ** 2 if shares else 0.0
 
 
-def _even(look: Look) -> bool:
+def is_even(look: Look) -> bool:
     """Does a disc of one shade before a wall of one level describe it?"""
     return look.noise < 0.2 * abs(look.contrast)
 
@@ -217,6 +217,7 @@ def _follow(
     def fit_at(i: int, look: Look, guess: Guess, free: bool = False) -> tuple[float, float, Look] | None:
         return rough_fit(batch[i], sight, look, guess, stage, free)
 
+    outlined = stage is not None and stage.silhouette
     first = fit_at(start, Look(h.radius_px, max(0.8, 0.12 * h.radius_px)), Guess(h.x_px, h.y_px), free=True)
     if first is None:
         return None
@@ -236,8 +237,8 @@ def _follow(
         return found[0] + patch.x_px, found[1] + patch.y_px, look
 
     def take(i: int, guess: Guess) -> bool:
-        fit = by_silhouette(i, guess) if stage is not None and stage.silhouette else fit_at(i, look, guess)
-        if fit is not None and not (stage is not None and stage.silhouette):
+        fit = by_silhouette(i, guess) if outlined else fit_at(i, look, guess)
+        if fit is not None and not outlined:
             fit = fit_at(i, look, Guess(fit[0], fit[1]), free=True)
         if fit is None or not 0.7 < fit[2].radius_px / look.radius_px < 1.4:
             return False

@@ -64,25 +64,20 @@ class Follower(Known):
     def follow(self, frame: Frame) -> None:
         """Measure one frame, in the order of the file."""
         shift = self._camera(frame)
-        x, y, vx, vy = self._expect(frame.t_s)
+        guess = self._ahead(frame)
         if (self.hidden or len(self.recent) < 3) and frame.index in self.found:
-            x, y = self.found[frame.index]  # the motion fitted to the start may be poor at its rim
-        guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
+            # the motion fitted to the start may be poor at its rim
+            guess = self._guess(*self.found[frame.index], guess.streak_x_px, guess.streak_y_px)
         repeated = self._is_repeat(frame)
-        patch = None if repeated else self._patch(frame, self.look, guess)
-        place = NOWHERE if patch is None else self._locate(patch, guess)
-        ok = patch is not None and self._believe(patch, place, x, y)
-        if not ok and not repeated:
-            place, patch, ok = self._look_around(frame, guess, place, patch)
-        ok = ok and patch is not None and self._stands_out(patch, place)
+        place, patch = (NOWHERE, None) if repeated else self._measure(frame, guess)
         r = self.record
         r.index.append(frame.index)
         r.t_s.append(frame.t_s)
         r.place.append(place)
-        r.ok.append(ok)
+        r.ok.append(patch is not None)
         r.shift.append(shift if self.shaking else None)
         r.repeated.append(repeated)
-        if ok and patch is not None:
+        if patch is not None:
             self._remember(frame, patch, place)
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
                 self._refit()
@@ -96,6 +91,18 @@ class Follower(Known):
         if len(r.index) == len(self.first):
             self._look_back(self.first)
             self.first = []
+
+    def _measure(self, frame: Frame, guess: Guess) -> tuple[Place, Patch | None]:
+        """Where the bob is, looked for at the guess, then around it; and the patch that shows it, None where what was found is
+        not believed."""
+        patch = self._patch(frame, self.look, guess)
+        place = NOWHERE if patch is None else self._locate(patch, guess)
+        if patch is None or not self._believe(patch, place, guess):
+            found = self._look_around(frame, guess)
+            if found is None:
+                return place, None
+            place, patch = found
+        return place, patch if self._stands_out(patch, place) else None
 
     def _locate(self, patch: Patch, guess: Guess) -> Place:
         if not self.look.even:
@@ -128,11 +135,9 @@ class Follower(Known):
         sigma = 0.03 * look.radius_px + 0.1
         return Place(x, y, sigma, sigma, **believed)
 
-    def _look_around(
-        self, frame: Frame, guess: Guess, place: Place, patch: Patch | None
-    ) -> tuple[Place, Patch | None, bool]:
+    def _look_around(self, frame: Frame, guess: Guess) -> tuple[Place, Patch] | None:
         """Not where it should be: the bob's outline near there, the farther the longer it was not seen and the faster it is
-        (a lost frame); now and then wherever it has been."""
+        (a lost frame); now and then wherever it has been. None where no such outline is believed to be the bob."""
         look = self.look
         way = self.interval_s * float(np.hypot(guess.streak_x_px, guess.streak_y_px)) / max(self.exposure_s, 1e-9)
         reach = min(6.0, 1.0 + 0.5 * self.hidden) * look.radius_px + 4 + min(way, 6 * look.radius_px)
@@ -142,19 +147,17 @@ class Follower(Known):
             wide = self._wherever_it_was(frame)
             found = None if wide is None else self._outline_in(wide)
         if wide is None or found is None:
-            return place, patch, False
+            return None
         near = guess._replace(x_px=found[0], y_px=found[1])
         close = self._patch(frame, look, near)
         if close is None:
-            return place, patch, False
+            return None
         other = self._locate(close, near)
         px, py = self.swing.pivot_px
         off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - self.swing.length_px)
         alike = other.visible >= min(0.9, self.ordinary_visible + 0.05) and 0.6 < other.contrast / look.contrast < 1.6
         on_arc = off_arc < 0.5 * look.radius_px + 2 + 2 * self.swing.rms_px
-        if alike and on_arc and self._believe(close, other, near.x_px, near.y_px):
-            return other, close, True
-        return place, patch, False
+        return (other, close) if alike and on_arc and self._believe(close, other, near) else None
 
     def _outline_in(self, wide: Patch, least: float = 0.6) -> tuple[float, float, float] | None:
         """The centre of the best outline of the bob's size before the background, and how much of the circle was seen; None
@@ -181,12 +184,8 @@ class Follower(Known):
         """How bright the light on the bob is against that when the background was learned: by the wall beside it."""
         if not np.isfinite(place.wall):
             return 1.0
-        reach = self.look.radius_px + 2 * self.look.edge_px
-        columns = np.round(place.x_px - patch.x_px + reach * _ROUND[0]).astype(int)
-        rows = np.round(place.y_px - patch.y_px + reach * _ROUND[1]).astype(int)
-        height, width = patch.back.shape
-        inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
-        level = float(patch.back[rows[inside], columns[inside]].mean()) if inside.any() else 0.0
+        around = _back_at(patch, place, (self.look.radius_px + 2 * self.look.edge_px) * _ROUND)
+        level = float(around.mean()) if around.size else 0.0
         return float(np.clip(place.wall / level, 0.3, 3.0)) if level > 1 else 1.0
 
     def _shade_now(self, patch: Patch, place: Place) -> float:
@@ -196,7 +195,7 @@ class Follower(Known):
         shades = (seen / self._light(patch, place), seen)
         return shades[0] if np.isnan(self._shade) else min(shades, key=lambda s: abs(s - self._shade))
 
-    def _believe(self, patch: Patch, place: Place, x: float, y: float) -> bool:
+    def _believe(self, patch: Patch, place: Place, guess: Guess) -> bool:
         look = self.look
         if not np.isfinite(place.x_px):
             return False
@@ -214,7 +213,7 @@ class Follower(Known):
             bright
             and place.visible >= self.ordinary_visible
             and misfit < 2 * self.ordinary_misfit + 0.03 * abs(look.contrast)
-            and np.hypot(place.x_px - x, place.y_px - y) < 0.6 * look.radius_px + 2
+            and np.hypot(place.x_px - guess.x_px, place.y_px - guess.y_px) < 0.6 * look.radius_px + 2
         )
 
     def _stands_out(self, patch: Patch, place: Place) -> bool:
@@ -223,14 +222,10 @@ class Follower(Known):
         shade = self._shade
         if np.isnan(shade) or not np.isfinite(place.wall):
             return True
-        columns = np.round(place.x_px - patch.x_px + self.look.radius_px * _WITHIN[0]).astype(int)
-        rows = np.round(place.y_px - patch.y_px + self.look.radius_px * _WITHIN[1]).astype(int)
-        height, width = patch.back.shape
-        inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
-        if inside.sum() < 8:
+        behind = _back_at(patch, place, self.look.radius_px * _WITHIN)
+        if behind.size < 8:
             return True
-        level = patch.back[rows[inside], columns[inside]]
-        return bool(np.mean(np.abs(level - shade) > 0.45 * abs(self.look.contrast)) > 0.6)
+        return bool(np.mean(np.abs(behind - shade) > 0.45 * abs(self.look.contrast)) > 0.6)
 
     def _remember(self, frame: Frame, patch: Patch, place: Place) -> None:
         """What the next frames are judged by."""
@@ -257,19 +252,18 @@ class Follower(Known):
                 self.recent.append((frame.t_s, r.place[k].x_px, r.place[k].y_px))
                 self.hidden = 0
             elif self.recent and not r.repeated[k]:
-                x, y, vx, vy = self._expect(frame.t_s)
-                guess = self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
-                patch = self._patch(frame, self.look, guess)
-                place = NOWHERE if patch is None else self._locate(patch, guess)
-                ok = patch is not None and self._believe(patch, place, x, y)
-                if not ok:
-                    place, patch, ok = self._look_around(frame, guess, place, patch)
-                if ok and patch is not None and self._stands_out(patch, place):
+                place, patch = self._measure(frame, self._ahead(frame))
+                if patch is not None:
                     r.place[k], r.ok[k] = place, True
                     self._remember(frame, patch, place)
                 else:
                     self.hidden += 1
         self.recent, self.hidden = kept
+
+    def _ahead(self, frame: Frame) -> Guess:
+        """Where the bob should be on the frame, and its streak."""
+        x, y, vx, vy = self._expect(frame.t_s)
+        return self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
 
     def _expect(self, t: float) -> tuple[float, float, float, float]:
         """Where the bob should be at time t and how fast, px and px/s: the fitted motion, moved by how far the bob was
@@ -342,3 +336,12 @@ class Follower(Known):
         coarse = frame.luma[4::16, 4::16].astype(np.int16)
         before, self._print = self._print, coarse
         return before is not None and bool(np.abs(coarse - before).max() <= 1)
+
+
+def _back_at(patch: Patch, place: Place, offsets: np.ndarray) -> np.ndarray:
+    """The background's brightness at these (2, n) offsets from a place, px, as far as the patch reaches."""
+    columns = np.round(place.x_px - patch.x_px + offsets[0]).astype(int)
+    rows = np.round(place.y_px - patch.y_px + offsets[1]).astype(int)
+    height, width = patch.back.shape
+    inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
+    return patch.back[rows[inside], columns[inside]]

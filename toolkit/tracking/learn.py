@@ -7,7 +7,7 @@ import numpy as np
 from toolkit.trackers import load_tracker
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch
-from toolkit.tracking.acquire import Rough, cut, scattered
+from toolkit.tracking.acquire import Rough, cut, is_even, scattered
 from toolkit.tracking.background import Background
 from toolkit.tracking.search import still_picture
 from toolkit.tracking.sight import LUMA
@@ -42,7 +42,7 @@ class Known:
         self._learn_background(batch, rough.look, points)
         self.growth: tuple[float, ...] | None = None  # slope and intercept of the bob's radius along x
         self.look, self.exposure_s = self._learn_looks(batch, rough.look, points, radius)
-        if self.look.noise > 0.2 * abs(self.look.contrast):
+        if not is_even(self.look):
             # what else there is beside the bob (a shadow) was fitted too, unless it must stand out as none of it
             strict = rough.look._replace(noise=0.05 * abs(rough.look.contrast) + 1.0)
             look, exposure_s = self._learn_looks(batch, strict, points, radius)
