@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -132,7 +132,8 @@ def analyse(
         series, found = measure(path, scene, progress=progress, **measuring)
         if ahead is not None:
             progress("compiling the equations, this once", 0.0)
-            ahead.result()
+            with suppress(Exception):  # what fails here fails again, and is told, where it is needed
+                ahead.result()
     scene = _with_what_the_recording_says(scene, series)
     stage_done("measure")
     from toolkit.diagnose import diagnose

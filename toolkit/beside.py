@@ -10,11 +10,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+# What the function prints must not get into its answer.
 _CHILD = """
-import pickle, sys
+import sys
+said, sys.stdout = sys.stdout.buffer, sys.stderr
 sys.path.insert(0, {root!r})
 from toolkit.beside import answer
-answer(sys.stdin.buffer, sys.stdout.buffer)
+answer(sys.stdin.buffer, said)
 """
 
 
