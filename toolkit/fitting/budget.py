@@ -127,8 +127,6 @@ def _budget(
     inverse: np.ndarray,
     level: float,
 ) -> Budget:
-    from scipy.special import stdtrit
-
     at, problem = _value(result, quantity), result.problem
     gradient = _gradient(result, quantity)
     rows = []
@@ -145,13 +143,22 @@ def _budget(
         by = (up - down) / (2 * told.u)
         estimate = _estimate(result, name)
         rows.append(Row(name, estimate, _INPUTS[name], told.u, "B", told.distribution, by, by * told.u, told.dof))
-    systematic = math.sqrt(sum(row.contribution**2 for row in rows if row.kind == "B"))
+    return add_up(quantity, at.value, at.unit, rows, level)
+
+
+def add_up(quantity: str, estimate: float, unit: str, rows: Sequence[Row], level: float = 0.95) -> Budget:
+    """The budget that these rows make."""
+    from scipy.special import stdtrit
+
+    statistical, systematic = (
+        math.sqrt(sum(row.contribution**2 for row in rows if row.kind == kind)) for kind in ("A", "B")
+    )
     u = math.hypot(statistical, systematic)
     fourth = sum(row.contribution**4 / row.dof for row in rows if row.dof > 0)
     effective = u**4 / fourth if fourth > 0 else math.inf
     factor = float(stdtrit(min(effective, 1e9), 0.5 + level / 2))
     return Budget(
-        quantity, at.value, at.unit, tuple(rows), statistical, systematic, u, effective, factor, factor * u, level
+        quantity, estimate, unit, tuple(rows), statistical, systematic, u, effective, factor, factor * u, level
     )
 
 

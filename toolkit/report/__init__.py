@@ -32,11 +32,7 @@ def import_ahead(formats: Sequence[str]) -> None:
     """Import what figures and writers need beside the measuring, which mostly waits for decoders and machine code."""
     from threading import Thread
 
-    needed = [
-        "toolkit.report.build",
-        "matplotlib.backends.backend_svg",
-        "matplotlib.font_manager",
-    ]
+    needed = ["toolkit.report.build", "matplotlib.backends.backend_svg", "matplotlib.font_manager"]
     needed += [name for kind, name in (("html", "jinja2"), ("pdf", "typst")) if kind in formats]
 
     def import_all() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import PendulabError
@@ -13,7 +12,7 @@ from toolkit.report.numbers import bare, number, with_uncertainty
 from toolkit.report.speech import symbol
 
 if TYPE_CHECKING:
-    from toolkit.fitting.budget import Row
+    from toolkit.fitting.budget import Budget
 
 _CLOCK_HALF_WIDTH = 50e-6
 _G_HALF_WIDTH = 0.026
@@ -31,41 +30,10 @@ _BY_CLOCK = {
 """Power of the unit of time in each quantity: how a relative error of the clock passes into it."""
 
 
-@dataclass(frozen=True)
-class Summed:
-    """One quantity's sources of uncertainty (the fit's own and those assumed here) and what they add up to."""
-
-    estimate: float
-    unit: str
-    rows: tuple[Row, ...]
-
-    @property
-    def statistical(self) -> float:
-        """Root sum of squares of the sources of type A."""
-        return math.sqrt(sum(r.contribution**2 for r in self.rows if r.kind == "A"))
-
-    @property
-    def systematic(self) -> float:
-        """Root sum of squares of the sources of type B."""
-        return math.sqrt(sum(r.contribution**2 for r in self.rows if r.kind == "B"))
-
-    @property
-    def u(self) -> float:
-        """Combined standard uncertainty."""
-        return math.hypot(self.statistical, self.systematic)
-
-    @property
-    def coverage_factor(self) -> float:
-        """Student's quantile for 95 % at the effective degrees of freedom (Welch and Satterthwaite)."""
-        from scipy.special import stdtrit
-
-        fourth = sum(r.contribution**4 / r.dof for r in self.rows if r.dof > 0)
-        return float(stdtrit(min(self.u**4 / fourth if fourth > 0 else math.inf, 1e9), 0.975))
-
-
-def summed(material: Material, name: str) -> Summed | None:
-    """The budget of a quantity of the full-sine fit; None for one that the fit did not find, or not above its error."""
-    from toolkit.fitting.budget import Row, budget
+def whole_budget(material: Material, name: str) -> Budget | None:
+    """The budget of a quantity of the full-sine fit, with what is assumed here added; None for one that the fit did not find,
+    or not above its error."""
+    from toolkit.fitting.budget import Input, Row, add_up, budget
 
     result, environment = material.full_sine, material.analysis.scene.environment
     found = result.parameters.get(name) if name in DRAGS else parameter(result, name)
@@ -86,24 +54,24 @@ def summed(material: Material, name: str) -> Summed | None:
         g = environment.gravity_m_per_s2
         assumed.append(("g", "m/s²", g, _G_HALF_WIDTH, drawn.estimate / g))
     for source, unit, estimate, half, sensitivity in assumed:
-        u = half / math.sqrt(3)
+        u = Input(half, "rectangular").u
         if sensitivity and all(row.quantity != source for row in rows):
             rows.append(Row(source, estimate, unit, u, "B", "rectangular", sensitivity, sensitivity * u, math.inf))
-    return Summed(drawn.estimate, drawn.unit, tuple(rows))
+    return add_up(name, drawn.estimate, drawn.unit, rows)
 
 
 def budget_section(material: Material) -> Section | None:
     """GUM budgets of the drag coefficients, of T₀, of the length and of g, as far as they were found."""
     words = material.words
     names = (*DRAGS, "T0", "equivalent_length", "g_from_length")
-    tables = [_table(material, name, found) for name in names if (found := summed(material, name)) is not None]
+    tables = [_table(material, name, found) for name in names if (found := whole_budget(material, name)) is not None]
     if not tables:
         return None
     return Section("budget", words("section.budget"), (Paragraph(words("text.budget")), *tables))
 
 
-def _table(material: Material, name: str, found: Summed) -> Table:
-    words, factor = material.words, found.coverage_factor
+def _table(material: Material, name: str, found: Budget) -> Table:
+    words = material.words
     lines = [
         (
             words.either(f"budget.{row.quantity}", row.quantity),
@@ -117,8 +85,8 @@ def _table(material: Material, name: str, found: Summed) -> Table:
         for row in found.rows
     ]
     for key, part in (
-        ("statistical_total", found.statistical),
-        ("systematic_total", found.systematic),
+        ("statistical_total", found.u_statistical),
+        ("systematic_total", found.u_systematic),
         ("total", found.u),
     ):
         lines.append((words(f"budget.{key}"), "", "", "", "", "", with_uncertainty(part, None, found.unit, 2)))
@@ -130,8 +98,8 @@ def _table(material: Material, name: str, found: Summed) -> Table:
         "budget.title",
         quantity=symbol(words, name),
         value=with_uncertainty(found.estimate, found.u, found.unit),
-        expanded=with_uncertainty(factor * found.u, None, found.unit, 2),
-        k=number(factor, 3),
+        expanded=with_uncertainty(found.expanded, None, found.unit, 2),
+        k=number(found.coverage_factor, 3),
     )
     return Table(f"budget_{name}", caption, header, tuple(lines), len(lines) - 1)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.report.budgets import summed
+from toolkit.report.budgets import whole_budget
 from toolkit.report.document import Fact, Figure, Verdict
 from toolkit.report.material import DRAGS, Material, parameter
 from toolkit.report.numbers import number, percent, with_uncertainty
@@ -124,7 +124,7 @@ def drag_answer(material: Material, result: FitResult) -> str:
 
 def _u(material: Material, name: str, found: FittedParameter) -> float | None:
     """The combined standard uncertainty of the budget, else that of the fit."""
-    drawn = summed(material, name)
+    drawn = whole_budget(material, name)
     return drawn.u if drawn is not None and drawn.u > 0 else found.stderr
 
 
