@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -86,11 +86,9 @@ class Camera:
 
     def __post_init__(self) -> None:
         _require_positive("camera", self, "width_px", "height_px", "fps", "duration_s", "px_per_m")
-        if self.effects:
-            from toolkit import camera
+        from toolkit.camera import check_parameters
 
-            checked = {name: camera.check_parameters(name, values) for name, values in self.effects.items()}
-            object.__setattr__(self, "effects", checked)
+        object.__setattr__(self, "effects", _checked_effects(self.effects, "camera", check_parameters))
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,9 @@ class Scene:
     camera: Camera | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "effects", _checked_effects(self.effects))
+        from toolkit.effects import check_parameters
+
+        object.__setattr__(self, "effects", _checked_effects(self.effects, "effects", check_parameters))
 
     def with_(self, **sections: Any) -> Scene:
         """A copy with whole sections replaced."""
@@ -220,14 +220,11 @@ def checked_number(value: Any, what: str) -> float:
     return float(value)
 
 
-def _checked_effects(table: Any) -> dict[str, dict[str, Any]]:
+def _checked_effects(table: Any, where: str, check: Callable[[str, Any], dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """`table` with every effect's parameters checked and complete."""
     if not isinstance(table, Mapping):
-        raise UsageError(f"[effects] must hold one table an effect, got {table!r}")
-    if not table:
-        return {}
-    from toolkit import effects
-
-    return {name: effects.check_parameters(name, values) for name, values in table.items()}
+        raise UsageError(f"[{where}] must hold one table an effect, got {table!r}")
+    return {name: check(name, values) for name, values in table.items()}
 
 
 def _read_camera(table: Any) -> Camera:

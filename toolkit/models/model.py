@@ -117,7 +117,9 @@ class Model:
         if self.from_scene:
             effects = tuple(name for name in scene.effects if name != "slack_string")  # which only watches the tension
             small_angle = scene.approximations.small_angle
-            formula = re.sub(r"\bt\b", f"(t + {shift_s!r})" if shift_s else "t", _torque(scene))
+            formula = str(scene.effects.get("formula", {}).get("torque", ""))
+            if shift_s:
+                formula = re.sub(r"\bt\b", f"(t + {shift_s!r})", formula)
         if "cosine_drive" in scene.effects and "cosine_drive" not in effects:
             effects = (*effects, "cosine_drive")
         model = replace(self, effects=effects, small_angle=small_angle, formula=formula)
@@ -305,10 +307,6 @@ def _combined(chain: Sequence[Mapping[str, float]], columns: Mapping[str, np.nda
         for column, weight in parts.items():
             row += weight * columns[column]
     return out.T
-
-
-def _torque(scene: Scene) -> str:
-    return str(scene.effects.get("formula", {}).get("torque", ""))
 
 
 @functools.lru_cache(maxsize=32)
