@@ -8,10 +8,8 @@ import numpy as np
 
 _FITS = 2.5  # a motion fits where places stray from it by less than so many times their scatter from frame to frame
 _CLOCK = 3.0  # by how much a localiser may be worse along the motion than across it
-_MOST, _WORST = (
-    3.0,
-    10.0,
-)  # what a fit's own σ may be wrong by in a bad clip; beyond the second it is not the localiser's
+_MOST = 3.0  # what a fit's own σ may be wrong by in a bad clip
+_WORST = 10.0  # beyond this it is not the localiser's
 _FREE = 9  # what a fitted motion has taken from the residuals of each axis
 
 
