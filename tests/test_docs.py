@@ -57,6 +57,12 @@ def test_links_lead_somewhere(page):
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
 
 
+@pytest.mark.parametrize("page", [p for p in PAGES if p.name != "add-an-effect.md"], ids=lambda p: p.name)
+def test_files_that_are_named_are_there(page):
+    for name in re.findall(r"`((?:toolkit|tests|benchmarks|docs|data)/[\w./-]+)`", page.read_text(encoding="utf-8")):
+        assert "NAME" in name or "LANG" in name or (ROOT / name).exists(), f"{page.name} names {name}"
+
+
 def test_the_site_map_names_every_page():
     site = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     for page in (ROOT / "docs").glob("**/*.md"):
