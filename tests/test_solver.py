@@ -53,6 +53,17 @@ def test_times_changed_in_place_are_seen():
     np.testing.assert_allclose(half[::2], EQUATION.solve(P, 1.0, 0.0, T, 1e-9).theta_rad[:21], atol=2e-9)
 
 
+@pytest.mark.parametrize("count", [1, 2, 7, 8, 9, 15, 16, 17, 33, 40, 65, 500])
+def test_the_number_of_samples_changes_no_digit(count):
+    """Samples are read off in vectors of many widths, and beyond a step's end: each must come out as if it were alone."""
+    t = np.linspace(0, 4, 500)
+    all_of_them = EQUATION.solve(P, 1.0, 0.3, t, 1e-9, NAMES)
+    few = EQUATION.solve(P, 1.0, 0.3, np.append(t[:count], 4.0), 1e-9, NAMES)
+    for one, other in zip(few[1:5], all_of_them[1:5]):
+        np.testing.assert_array_equal(one[:count], other[:count])
+        np.testing.assert_array_equal(one[-1], other[-1])
+
+
 def test_threads_do_not_share_memory():
     alone = {a: EQUATION.solve(P, a, 0.0, T, 1e-10).theta_rad for a in (0.5, 1.5)}
     wrong = []

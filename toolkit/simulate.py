@@ -28,7 +28,7 @@ def simulate(scene: Scene, t_s: Any, accuracy_rad: float = 1e-9) -> Trajectory:
     release = scene.release
     if "slack_string" in scene.effects:
         return _simulate_slack(scene, equation, parameters, t, accuracy_rad)
-    solution = equation.solve(parameters, release.theta0_rad, release.omega0_rad_per_s, t, accuracy_rad)
+    solution = equation.solve(parameters, release.theta0_rad, release.omega0_rad_per_s, t, accuracy_rad, spare_rows=2)
     return _trajectory(scene, equation, parameters, solution, accuracy_rad)
 
 
@@ -71,7 +71,7 @@ def _trajectory(
         warnings += ("the scene gives no mass: tension and energy are left out",)
     else:
         integrated = solution.cost.steps > 0
-        tension, energy = equation.tension_and_energy(parameters, t, theta, omega, compiled=integrated)
+        tension, energy = equation.tension_and_energy(parameters, t, theta, omega, integrated, solution.spare)
         if t.size and tension.min() < 0:
             first = int(np.argmax(tension < 0))
             warnings += (

@@ -104,13 +104,15 @@ class Equation:
         theta_rad: np.ndarray,
         omega_rad_per_s: np.ndarray,
         compiled: bool = False,
+        into: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tension (N) and energy (J) along a motion: as `terms_at`, without evaluating what does not enter them.
 
         compiled : by machine code, where no effect but gravity and inertia enters; θ and θ' must be writable.
+        into : (2, n) to be filled, rather than new memory.
         """
         mass, length, g = parameters["mass_kg"], parameters["length_m"], parameters["g_m_per_s2"]
-        both = np.empty((2, t_s.size))
+        both = np.empty((2, t_s.size)) if into is None else into
         tension, energy = both
         if compiled and t_s.size and not self._observed and not self.small_angle:
             numbers = (c_double * 5)(t_s.size, mass * length, mass * g, mass * g * length, mass * length**2 / 2)
@@ -259,21 +261,23 @@ class Equation:
         accuracy_rad: float = 1e-9,
         sensitivities: Sequence[str] = (),
         start_s: float = 0.0,
+        spare_rows: int = 0,
     ) -> Solution:
         """θ(t) from the state at `start_s`, to within `accuracy_rad`.
 
         parameters : values by full name (see `parameters`; more may be given).    t_s : (n,) increasing times in s,
-        not before start_s.    sensitivities : names of parameters, "theta0_rad" or "omega0_rad_per_s".
+        not before start_s.    sensitivities : names of parameters, "theta0_rad" or "omega0_rad_per_s".    spare_rows : see `Solution`.
         Raises UsageError for a missing parameter or an unknown sensitivity, JobError where the motion leaves all bounds.
         """
         t = np.ascontiguousarray(t_s, dtype=float)
-        asked = (self, accuracy_rad, tuple(sensitivities), start_s)
+        asked = (self, accuracy_rad, tuple(sensitivities), start_s, spare_rows)
         known = getattr(_recent, "solver", None)
-        times = t.tobytes()
-        if known is None or _recent.asked != asked or times != _recent.times:
+        if known is None or _recent.asked != asked or not np.array_equal(t, known.t_s):
             # t is copied: whoever called may change it
-            known = _recent.solver = Solver(self, t.copy(), accuracy_rad, asked[2], start_s, again=False)
-            _recent.asked, _recent.times = asked, times
+            known = _recent.solver = Solver(
+                self, t.copy(), accuracy_rad, asked[2], start_s, again=False, spare_rows=spare_rows
+            )
+            _recent.asked = asked
         return known.solve(parameters, theta0_rad, omega0_rad_per_s)
 
     def index_of(self, name: str) -> int | None:

@@ -26,7 +26,8 @@ _NAMES_OF_EVENTS = ("stick", "slip")
 class Solution(NamedTuple):
     """θ and θ' at the times asked for; d_theta and d_omega (n, k) are their derivatives by the k sensitivities.
 
-    A named tuple: a short solve takes little longer than making a frozen dataclass would. `error_estimate_rad` is the estimated largest error of θ over the whole run, all steps' errors carried along.
+    `error_estimate_rad` is the estimated largest error of θ over the whole run, all steps' errors carried along. `spare` is
+    (rows, n) of memory for the caller to fill: what shares one block with the solution is not fetched from the system anew.
     """
 
     t_s: np.ndarray
@@ -39,6 +40,7 @@ class Solution(NamedTuple):
     error_estimate_rad: float
     events: tuple[Event, ...] = ()
     warnings: tuple[str, ...] = ()
+    spare: np.ndarray | None = None
 
 
 class Solver:
@@ -57,6 +59,7 @@ class Solver:
         sensitivities: Sequence[str] = (),
         start_s: float = 0.0,
         again: bool = True,
+        spare_rows: int = 0,
     ):
         t = np.ascontiguousarray(t_s, dtype=float)
         if t.ndim != 1 or (t.size and not (t[0] >= start_s and t[-1] < math.inf and (t[1:] >= t[:-1]).all())):
@@ -65,6 +68,7 @@ class Solver:
             raise UsageError(f"accuracy_rad must be positive, got {accuracy_rad}")
         self.equation, self.t_s, self.accuracy_rad = equation, t, accuracy_rad
         self.sensitivities, self.start_s, self.again = tuple(sensitivities), start_s, again
+        self.spare_rows = spare_rows
         self._none = np.empty((t.size, 0))
         self._parameters: tuple[float, ...] = ()
         self._scale = 0.0  # seconds in a unit of the integrators' time: a power of two, so that scaling rounds nothing
@@ -104,13 +108,15 @@ class Solver:
             raise JobError("the motion grows without bound or meets a singularity; check the effects' parameters")
         out, error, method, cost, events = run
         d_theta = d_omega = self._none
+        solved = len(out) - self.spare_rows
         if self.sensitivities:
-            d_theta, d_omega = out[2::2].T, out[3::2].T
+            d_theta, d_omega = out[2:solved:2].T, out[3:solved:2].T
         warnings: tuple[str, ...] = ()
         if not error <= self.accuracy_rad:
             text = f"asked for {self.accuracy_rad:.1e} rad, the estimated error is {error:.1e} rad: the motion amplifies rounding"
             warnings = (text,)
-        return Solution(self.t_s, out[0], out[1], d_theta, d_omega, method, cost, error, events, warnings)
+        spare = out[solved:] if self.spare_rows else None
+        return Solution(self.t_s, out[0], out[1], d_theta, d_omega, method, cost, error, events, warnings, spare)
 
     def _resolve(self, p: tuple[float, ...]) -> None:
         """What follows from the parameters alone."""
@@ -184,11 +190,11 @@ class _Work:
         for i, name in enumerate(names):
             self.numbers[6 + 2 * i] = float(name == START[0])
             self.numbers[7 + 2 * i] = scale if name == START[1] else 0.0
-        self.shape = (2 + 2 * k, count)
+        self.shape = (2 + 2 * k + solver.spare_rows, count)
         self.report = (c_double * (4 + 3 * routes.MOST_EVENTS))()
-        self.loosest = route.first * self.accuracy
+        self.loosest = route.loosest * self.accuracy
         span = 1.0 + 0.3 * float(tau[count - 1] - self.numbers[3]) if is_series or route.stages > 6 else 1.0
-        self.first, self.settled = max(self.loosest / span, route.floor), False
+        self.first, self.settled = max(route.first * self.accuracy / span, route.floor), False
         arrays = (layout, columns, tau, np.empty(route.work_size(rows, k)), route.table)
         self.kept = arrays  # in memory, while their addresses are used
         at_layout, at_columns, at_tau, at_memory, at_table = (array.ctypes.data for array in arrays)
@@ -225,7 +231,7 @@ class _Work:
             evaluations += int(steps) * (route.stages or order)
             if status != routes.DONE or error <= accuracy or tolerance <= route.floor:
                 break
-            tolerance = max(tolerance * 0.3 * accuracy / error, route.floor)
+            tolerance = max(tolerance * 0.1 * accuracy / error, route.floor)
         if self.again:
             self.first = tolerance
             if tolerance != began_with:

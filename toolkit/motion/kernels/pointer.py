@@ -13,7 +13,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 REALS, WHOLES = types.CPointer(types.float64), types.CPointer(types.int64)
-_PIXELS = types.CPointer(types.float32)
+_PIXELS, _GREYS = types.CPointer(types.float32), types.CPointer(types.uint8)
 
 
 def _at(kind: Any, places: Any) -> Any:
@@ -40,6 +40,12 @@ def wholes(typing: Any, places: Any, number: Any) -> Any:
 def pixels(typing: Any, places: Any, number: Any) -> Any:
     """The array of float32 whose address is the numbered one of `places`."""
     return _at(_PIXELS, places)
+
+
+@intrinsic
+def greys(typing: Any, places: Any, number: Any) -> Any:
+    """The array of uint8 whose address is the numbered one of `places`."""
+    return _at(_GREYS, places)
 
 
 @intrinsic

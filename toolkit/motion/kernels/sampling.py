@@ -7,7 +7,7 @@ from typing import Any
 from numba import njit
 
 from toolkit.motion.kernels.pointer import skip
-from toolkit.motion.kernels.vector import evaluate_8, evaluate_16
+from toolkit.motion.kernels.vector import evaluate_8, evaluate_32
 from toolkit.motion.routes import ROW
 
 
@@ -19,7 +19,7 @@ def sample_step(
     """Fill `out` from sample i on for the times up to hi + lo + h, and give the first sample beyond.
 
     first : the series of θ, and a row on that of θ'; others : `pairs` more such pairs. n : their order. spare : room for
-    16 numbers. Behind the last time there must be seven numbers more that may be read.
+    16 numbers. Samples beyond the step may be written too, in the last vector: a later step overwrites them.
     """
     stop = i
     while stop + 16 <= count and (t[stop + 15] - hi) - lo <= h:
@@ -30,16 +30,17 @@ def sample_step(
         series = skip(others, 2 * (a - 1) * ROW) if a > 0 else first
         row = skip(out, 2 * a * count)
         j = i
-        while j + 16 <= stop:
-            evaluate_16(series, n, skip(t, j), hi, lo, skip(row, j), count, factor)
-            j += 16
         while j < stop:
-            if j + 8 <= stop:
+            if stop - j > 16 and j + 32 <= count:
+                evaluate_32(series, n, skip(t, j), hi, lo, skip(row, j), count, factor)
+                j += 32
+            elif j + 8 <= count:
                 evaluate_8(series, n, skip(t, j), hi, lo, skip(row, j), count, factor)
-            else:
+                j += 8
+            else:  # behind the last time there are seven numbers more that may be read, but no room to write
                 evaluate_8(series, n, skip(t, j), hi, lo, spare, 8, factor)
                 for m in range(stop - j):
                     row[j + m] = spare[m]
                     row[count + j + m] = spare[8 + m]
-            j += 8
+                j = stop
     return stop

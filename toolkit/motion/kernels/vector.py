@@ -1,4 +1,4 @@
-"""Polynomials at many places in compiled code, four numbers at a time.
+"""Polynomials at many places in compiled code, eight numbers at a time.
 
 In LLVM's own vectors; a processor with narrower registers takes two for one.
 """
@@ -15,7 +15,7 @@ from numba.extending import intrinsic
 from toolkit.motion.kernels.pointer import REALS
 from toolkit.motion.routes import ROW
 
-WIDTH = 4
+WIDTH = 8
 _DOUBLE = ir.DoubleType()
 _VECTOR = ir.VectorType(_DOUBLE, WIDTH)
 _ZERO = ir.Constant(_VECTOR, [0.0] * WIDTH)
@@ -84,4 +84,4 @@ def _polynomials(groups: int) -> Any:
     return evaluate
 
 
-evaluate_8, evaluate_16 = _polynomials(2), _polynomials(4)
+evaluate_8, evaluate_32 = _polynomials(1), _polynomials(4)
