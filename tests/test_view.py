@@ -9,7 +9,8 @@ from toolkit.calibrate import calibrate
 from toolkit.render import stage
 from toolkit.scene import Scene
 from toolkit.track import Track
-from toolkit.tracking.clock import place_lost_frames
+from toolkit.tracking.clock import out_of_time, place_lost_frames
+from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.tracking.view_fit import Lines, fit_view
 
@@ -150,6 +151,12 @@ def test_a_swing_of_which_one_side_is_hidden_keeps_its_vertical():
     np.testing.assert_allclose(series.theta_rad, truth.theta_rad[side], atol=2e-3)
 
 
+def placed(t, x, y):
+    """Places that were all measured, to 0.05 px."""
+    sigma = np.full(t.size, 0.05)
+    return Places(t, x, y, sigma, sigma, np.ones(t.size, bool), np.zeros(t.size, bool))
+
+
 def test_a_lost_frame_is_placed_where_the_motion_leaps():
     motion = Swing(np.array([320, -60, 400, 0.0, 12.0, 0.02, 0.0, 0.4, 0.0]), np.zeros((9, 9)), 0.0, 0.0)
     true = np.arange(301) / 60
@@ -158,15 +165,14 @@ def test_a_lost_frame_is_placed_where_the_motion_leaps():
     rng = np.random.default_rng(1)
     x, y = x + rng.normal(0, 0.05, x.size), y + rng.normal(0, 0.05, y.size)
     stamps = np.arange(300) / 60
-    good = np.ones(300, bool)
     swing = fit_swing(stamps, x, y, np.full(300, 0.1), motion.values)
     warned: list[str] = []
-    t, better = place_lost_frames(stamps, x, y, swing, good, np.zeros(300, bool), warned)
+    found, better = place_lost_frames(placed(stamps, x, y), swing, warned)
     assert len(warned) == 1
-    np.testing.assert_allclose(t, true, atol=2e-3)
+    np.testing.assert_allclose(found.t_s, true, atol=2e-3)
     assert better.rms_px < 0.06
-    same, _ = place_lost_frames(true, x, y, better, good, np.zeros(300, bool), [])
-    np.testing.assert_array_equal(same, true)
+    same, _ = place_lost_frames(placed(true, x, y), better, [])
+    np.testing.assert_array_equal(same.t_s, true)
 
 
 def test_frames_are_not_placed_where_more_is_amiss():
@@ -175,12 +181,11 @@ def test_frames_are_not_placed_where_more_is_amiss():
     x, y = motion.position(true)
     x = x + 12 * np.sin(2.1 * true)  # something else moves it too
     stamps = np.arange(300) / 60
-    good = np.ones(300, bool)
     swing = fit_swing(stamps, x, y, np.full(300, 0.1), motion.values)
     warned: list[str] = []
-    t, _ = place_lost_frames(stamps, x, y, swing, good, np.zeros(300, bool), warned)
-    np.testing.assert_array_equal(t, stamps)
-    assert [w.key for w in warned] in ([], ["track.clock_slips"])
+    found, _ = place_lost_frames(placed(stamps, x, y), swing, warned)
+    np.testing.assert_array_equal(found.t_s, stamps)
+    assert not warned
 
 
 def test_draws_of_which_hardly_one_counts_come_to_an_end(monkeypatch):
@@ -201,10 +206,6 @@ def test_draws_of_which_hardly_one_counts_come_to_an_end(monkeypatch):
 
 def test_a_repeated_picture_near_a_turning_point_is_left_out():
     """The bob stands where it was one frame before: half a pixel off, too little for a leap, far too much for chance."""
-    from types import SimpleNamespace
-
-    from toolkit.tracking.clock import out_of_time
-
     t = np.arange(240) / 60
     rng = np.random.default_rng(8)
     angle = 0.4 * np.cos(4.1 * t)
@@ -217,8 +218,6 @@ def test_a_repeated_picture_near_a_turning_point_is_left_out():
         x[k], y[k] = x[k - 1], y[k - 1]
     swing = fit_swing(t, x, y, np.full(t.size, 0.1), start_swing(t, x, y))
     assert swing is not None
-    mx, my = swing.position(t)
-    seen_again = SimpleNamespace(repeated=[False] * t.size)
-    left_out = out_of_time(seen_again, t, x - mx, y - my, swing, np.ones(t.size, bool), [], [])
+    left_out = out_of_time(placed(t, x, y), swing, [], [])
     assert set(slow) <= set(np.flatnonzero(left_out).tolist())
     assert left_out.sum() <= len(slow) + 2

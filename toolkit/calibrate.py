@@ -318,9 +318,7 @@ def _lines(track: Track, kept: np.ndarray) -> Lines | None:
     if track.meta.get("string_angle_rad") is None:
         return None
     names = ("x_px", "y_px", "angle_rad", "angle_sigma_rad", "sigma_px", "half_px")
-    lines = Lines(*[*(np.asarray(track.meta[f"string_{n}"])[kept] for n in names), track.t_s[kept]])
-    good = np.isfinite(lines.angle_rad)
-    return lines.of(good) if good.sum() >= 8 else None
+    return Lines(*[*(np.asarray(track.meta[f"string_{n}"]) for n in names), track.t_s]).of(kept).seen()
 
 
 def _string_pivot(track: Track, kept: np.ndarray) -> PivotEstimate | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -16,22 +16,19 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
-from toolkit.tracking.clock import clock_slips, even_times, out_of_time, place_lost_frames
-from toolkit.tracking.follow import Follower
-from toolkit.tracking.scatter import Factors, true_sigma
+from toolkit.tracking.clock import even_times, out_of_time, place_lost_frames, slips_told
+from toolkit.tracking.follow import Follower, Record
+from toolkit.tracking.joint import Camera, fit_jointly
+from toolkit.tracking.places import Places
 from toolkit.tracking.shake import Shake
 from toolkit.tracking.string_line import seen_half
-from toolkit.tracking.swing import Swing, fit_swing, start_swing
-from toolkit.tracking.verdict import poor_motion, require_pendulum
-from toolkit.tracking.view import View
-from toolkit.tracking.view_fit import Lines, fit_view
+from toolkit.tracking.verdict import poor_motion, poor_picture, require_pendulum
+from toolkit.tracking.view_fit import Lines
+from toolkit.tracking.whole_swing import whole_swing
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
 
-
-_CALM = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}  # damping of a pendulum of which little is known yet
-_POOR_PICTURE = 0.12  # of the contrast
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
 
 
@@ -205,102 +202,49 @@ def _require_frames(batch: list[Frame], video: Video) -> None:
 
 def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None, fps_factor: float) -> Track:
     """Judge the whole motion, bridge the gaps, make σ true."""
-    r = follower.record
+    record, look = follower.record, follower.look
     log: list[str] = []
     warnings: list[str] = []
-    t = even_times(np.array(r.t_s), video, log)
-    evened = bool(log)
-    t = t - t[0]
-    x, y, sx, sy = (np.array([getattr(p, n) for p in r.place]) for n in ("x_px", "y_px", "sigma_x_px", "sigma_y_px"))
-    good = np.array(r.ok)
-    if good.sum() < max(8, 0.3 * good.size):
-        raise JobError(f"the bob was seen on only {good.sum()} of {good.size} frames of {video.path}; {REMEDY}")
-    start = follower.swing
-    start = Swing(start.values, start.covariance, start.t0_s - r.t_s[0], start.rms_px)
-    shift = Shake(follower, good, log)
-    x, y = x + shift.raw_x - shift.x, y + shift.raw_y - shift.y
-    swing = _whole_swing(start, t, x, y, good, video.path)
-    require_pendulum(swing, t, x, y, good, video.path)
-    stamps = t
-    t, swing = place_lost_frames(t, x, y, swing, good, np.array(r.repeated), warnings)
-    mx, my = swing.position(t)
-    good = good & ~out_of_time(r, t, x - mx, y - my, swing, good, log, warnings)
-    for a in (x, y, sx, sy):
-        a[~good] = np.nan
-    time_sigma = video.tick_s / np.sqrt(12) if video.tick_s > 2e-4 and not evened else 0.0
-    strings = np.full((t.size, 6), np.nan)
-    for k, line in r.string.items():
-        strings[k, :5] = line
-    strings[:, 5] = seen_half(np.hypot(strings[:, 0] - x, strings[:, 1] - y), follower.look.radius_px)
-    straight = good & np.isfinite(strings[:, 5])
-    lines = Lines(*[*strings[straight].T, t[straight] / fps_factor]) if straight.sum() >= 8 else None
-    misfit = float(np.median([p.misfit for p, g in zip(r.place, good) if g])) / max(abs(follower.look.contrast), 1.0)
-    view: View | None = None
+    t = even_times(np.array(record.t_s), video, log)
+    time_sigma = video.tick_s / np.sqrt(12) if video.tick_s > 2e-4 and not log else 0.0
+    places = Places.of(record, t - t[0])
+    _require_seen(places, video)
+    shake = Shake(follower, places.good, log)
+    places = replace(places, x_px=places.x_px + shake.raw_x - shake.x, y_px=places.y_px + shake.raw_y - shake.y)
+    stamps = places.t_s
 
-    def _scatter(rx: np.ndarray, ry: np.ndarray, rough: bool = False) -> Factors:
-        v = swing.velocity(t[good])
-        known = shift.sigma[good], time_sigma
-        found = true_sigma((rx[good], ry[good]), (sx[good], sy[good]), v, *known, rough)
-        if not follower.shaking:
-            return found
-        # the picture's own places hold the shake, but not the error with which it was measured
-        shaken = (rx + shift.x)[good], (ry + shift.y)[good]
-        own = true_sigma(shaken, (sx[good], sy[good]), v, 0 * shift.sigma[good], time_sigma)
-        return Factors(min(found.x, own.x), min(found.y, own.y), found.shake_px)
+    followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
+    swing = whole_swing(followed, places, video.path)
+    require_pendulum(swing, places, video.path)
+    places, swing = place_lost_frames(places, swing, warnings)
+    places = places.without(out_of_time(places, swing, log, warnings))
 
-    vx, vy = (np.hypot(v * time_sigma, shift.sigma) for v in swing.velocity(t))
-    scale = _scatter(x - mx, y - my, rough=True)
-    for _ in range(2):  # error bars and the view of the camera each need the other
-        found = fit_view(
-            t[good] / fps_factor,
-            x[good],
-            y[good],
-            np.sqrt((sx * scale.x) ** 2 + vx**2 + scale.shake_px**2)[good],
-            np.sqrt((sy * scale.y) ** 2 + vy**2 + scale.shake_px**2)[good],
-            np.array(_at_first_measured(swing, t, good, fps_factor)),
-            (video.width_px, video.height_px),
-            lines,
-            None if pivot is None else (*pivot, 1.0),
-            rows_along_x=video.rotation_deg % 180 != 0,
-            off_px=max(0.02, misfit * follower.look.radius_px / 3),
-        )
-        if found is None:
-            break
-        view = found
-        mx, my = view.position(t / fps_factor, mx, my)
-        before, scale = scale, _scatter(x - mx, y - my)
-        if not view.shown or min(scale.x / before.x, scale.y / before.y) > 0.6:
-            break
-    if view is not None and not clock_slips(t, x - mx, y - my, swing, good):  # what tilt or lens explain is no slip
-        warnings = [w for w in warnings if getattr(w, "key", "") != "track.clock_slips"]
-    sigma = np.hypot(shift.sigma, scale.shake_px)
-    sx, sy = sx * scale.x, sy * scale.y
-    rms_px = float(np.sqrt(0.5 * np.mean((x - mx)[good] ** 2 + (y - my)[good] ** 2)))
-    late = time_sigma * np.hypot(*swing.velocity(t))
-    typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + shift.sigma**2)[good])))
-    motion = swing if view is None else view.swing(fps_factor)
-    warnings += poor_motion(motion, t, good, rms_px, typical)
-    if misfit > _POOR_PICTURE or not follower.look.even:
-        warnings.append(
-            said(
-                "track.poor_picture",
-                "the bob does not look like an even disc (a pattern, a highlight or a shadow: {share:.0%} of its contrast is not "
-                "explained); its centre may be off by about {off_px:.1f} px, much of it the same on all frames",
-                share=misfit,
-                off_px=misfit * follower.look.radius_px / 3,
-            )
-        )
+    good = places.good
+    misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
+    off_px = misfit * look.radius_px / 3
+    strings = _strings(record, places, look.radius_px, fps_factor)
+    camera = Camera(
+        (video.width_px, video.height_px), pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor
+    )
+    joint = fit_jointly(places, swing, shake, time_sigma, strings.seen(), camera)
+
+    rms_px = float(
+        np.sqrt(0.5 * np.mean((places.x_px - joint.x_px)[good] ** 2 + (places.y_px - joint.y_px)[good] ** 2))
+    )
+    sx, sy = places.sigma_x_px * joint.factors.x, places.sigma_y_px * joint.factors.y
+    late = time_sigma * np.hypot(*swing.velocity(places.t_s))
+    typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + shake.sigma**2)[good])))
+    motion = swing if joint.view is None else joint.view.swing(fps_factor)
+    warnings += slips_told(places, swing, joint.x_px, joint.y_px)
+    warnings += poor_motion(motion, places.t_s, good, rms_px, typical)
+    warnings += poor_picture(misfit, look.even, off_px)
     for odd in clock_warnings(stamps, video):  # what the stamps account for affects no result
         (log if getattr(odd, "key", "") in _HARMLESS else warnings).append(odd)
-    status = np.where(good, OK, LOST).astype("U9")
-    bridged = _bridged(good, t, swing.period_s)
-    spread = float(np.hypot(np.nanstd((x - mx)[good]), np.nanstd((y - my)[good])))
-    x[bridged], y[bridged] = mx[bridged], my[bridged]
-    sx[bridged] = sy[bridged] = max(spread, 0.02)
-    status[bridged] = PREDICTED
-    steps = np.diff(t)
-    fps = float(1 / np.median(steps[steps > 0])) * fps_factor if np.any(steps > 0) else float("nan")
-    look = follower.look
+
+    bridged = _bridged(good, places.t_s, swing.period_s)
+    x, y = (np.where(bridged, m, p) for m, p in ((joint.x_px, places.x_px), (joint.y_px, places.y_px)))
+    spread = float(np.hypot(np.nanstd((places.x_px - joint.x_px)[good]), np.nanstd((places.y_px - joint.y_px)[good])))
+    steps = np.diff(places.t_s)
     log += [
         said(
             "track.followed",
@@ -319,102 +263,69 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         said(
             "track.error_bars",
             "The error bars of the fit were multiplied by {x:.2f} (x) and {y:.2f} (y), the scatter seen about a smooth motion.",
-            x=scale.x,
-            y=scale.y,
+            x=joint.factors.x,
+            y=joint.factors.y,
         ),
     ]
     return Track(
-        frame=np.array(r.index),
-        t_s=t / fps_factor,
-        x_px=x + shift.x,
-        y_px=y + shift.y,
-        sigma_x_px=sx,
-        sigma_y_px=sy,
-        status=status,
+        frame=np.array(record.index),
+        t_s=places.t_s / fps_factor,
+        x_px=x + shake.x,
+        y_px=y + shake.y,
+        sigma_x_px=np.where(bridged, max(spread, 0.02), sx),
+        sigma_y_px=np.where(bridged, max(spread, 0.02), sy),
+        status=np.where(good, OK, np.where(bridged, PREDICTED, LOST)),
         radius_px=float(look.radius_px),
-        pivot_px=pivot or (swing if view is None else view).pivot_px,
-        pivot_sigma_px=(1.0, 1.0) if pivot else (swing if view is None else view).pivot_sigma_px,
+        pivot_px=pivot or (joint.view or swing).pivot_px,
+        pivot_sigma_px=(1.0, 1.0) if pivot else (joint.view or swing).pivot_sigma_px,
         localiser=follower.localiser.name,
         meta={
             "source": str(video.path),
             "width_px": video.width_px,
             "height_px": video.height_px,
-            "fps": fps,
+            "fps": float(1 / np.median(steps[steps > 0])) * fps_factor if np.any(steps > 0) else float("nan"),
             "fps_factor": fps_factor,
             "time_source": video.time_source,
             "sight": follower.sight.name,
             "exposure_s": follower.exposure_s / fps_factor,
             "edge_px": float(look.edge_px),
             "contrast": float(look.contrast),
-            "visible": np.array([p.visible for p in r.place]),
-            "misfit": np.array([p.misfit for p in r.place]),
+            "visible": np.array([p.visible for p in record.place]),
+            "misfit": np.array([p.misfit for p in record.place]),
             "residual_rms_px": rms_px,
-            "view": view,
-            "swing": _at_first_measured(swing, t, good, fps_factor),
+            "view": joint.view,
+            "swing": swing.values_at(places.t_s[good][0], fps_factor),
             "pivot_given": pivot is not None,
-            "shift_x_px": shift.x,
-            "shift_y_px": shift.y,
-            "shift_sigma_px": sigma,
+            "shift_x_px": shake.x,
+            "shift_y_px": shake.y,
+            "shift_sigma_px": np.hypot(shake.sigma, joint.factors.shake_px),
             "time_sigma_s": time_sigma / fps_factor,
-            "string_x_px": strings[:, 0],
-            "string_y_px": strings[:, 1],
-            "string_angle_rad": strings[:, 2],
-            "string_angle_sigma_rad": strings[:, 3],
-            "string_sigma_px": strings[:, 4],
-            "string_half_px": strings[:, 5],
+            "string_x_px": strings.x_px,
+            "string_y_px": strings.y_px,
+            "string_angle_rad": strings.angle_rad,
+            "string_angle_sigma_rad": strings.sigma_rad,
+            "string_sigma_px": strings.sigma_px,
+            "string_half_px": strings.half_px,
             "log": log,
             "warnings": [*video.warnings, *warnings],
         },
     )
 
 
-def _whole_swing(start: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray, path: Path) -> Swing:
-    """The motion over the whole clip, from the motion followed; where that does not lead there, from the places alone."""
-    chosen = np.flatnonzero(good)
-    theta, rate = start.angle(t[chosen[:1]])
-    values = start.values.copy()
-    values[7:] = theta[0], rate[0]
-    swing = _grown_swing(values, t, x, y, chosen)
-    if swing is None or swing.rms_px > 0.02 * np.hypot(np.ptp(x[chosen]), np.ptp(y[chosen])):
-        first = chosen[t[chosen] < t[chosen[0]] + 1.5 * start.period_s]
-        other = start_swing(t[first], x[first], y[first]) if first.size >= 12 else None
-        anew = None if other is None else _grown_swing(other, t, x, y, chosen)
-        if anew is not None and (swing is None or anew.rms_px < swing.rms_px):
-            swing = anew
-    if swing is None:
-        raise JobError(f"what moves in {path} does not swing like a pendulum; if there is one, {REMEDY}")
-    return swing
+def _require_seen(places: Places, video: Video) -> None:
+    seen, of = int(places.good.sum()), places.good.size
+    if seen < max(8, 0.3 * of):
+        raise JobError(f"the bob was seen on only {seen} of {of} frames of {video.path}; {REMEDY}")
 
 
-def _grown_swing(values: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> Swing | None:
-    """The motion through the `chosen` frames, fitted in growing pieces, so that no swing is lost count of."""
-    swing: Swing | None = None
-    period = 2 * np.pi / np.sqrt(max(values[4], 1e-9))
-    stop = t[chosen[0]] + max(0.75 * period, 0.3)
-    while True:
-        part = chosen[t[chosen] <= stop]
-        if part.size >= 12:
-            p = part[:: max(1, part.size // 1500)]
-            calm = _CALM if stop < t[-1] else None
-            swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=calm)
-            if swing is None and calm is None:
-                swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=_CALM)
-            if swing is None:
-                return None
-            values = swing.values
-        if stop >= t[-1]:
-            return swing
-        stop = t[chosen[0]] + 2 * (stop - t[chosen[0]])
-
-
-def _at_first_measured(swing: Swing, t: np.ndarray, good: np.ndarray, fps_factor: float) -> list[float]:
-    """The fitted motion's values (the order of `toolkit.tracking.swing.NAMES`) with the state at the first measured frame."""
-    theta, rate = swing.angle(t[good][:1])
-    values = swing.values.copy()
-    values[7:] = theta[0], rate[0] * fps_factor
-    values[4] *= fps_factor**2
-    values[5] *= fps_factor
-    return [float(v) for v in values]
+def _strings(record: Record, places: Places, radius_px: float, fps_factor: float) -> Lines:
+    """The string's line on each frame, NaN where none was seen."""
+    lines = np.full((places.t_s.size, 5), np.nan)
+    for k, line in record.string.items():
+        lines[k] = line
+    x, y, angle, angle_sigma, sigma = lines.T
+    half = seen_half(np.hypot(x - places.x_px, y - places.y_px), radius_px)
+    return Lines(x, y, angle, angle_sigma, sigma, half, places.t_s / fps_factor)
 
 
 def _bridged(good: np.ndarray, t: np.ndarray, period_s: float) -> np.ndarray:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from toolkit.sentence import said
-from toolkit.tracking.follow import Record
+from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Video
 
@@ -51,17 +53,11 @@ def even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:
     return grid + 0.5 * (off.max() + off.min())
 
 
-def out_of_time(
-    r: Record,
-    t: np.ndarray,
-    rx: np.ndarray,
-    ry: np.ndarray,
-    swing: Swing,
-    good: np.ndarray,
-    log: list[str],
-    warnings: list[str],
-) -> np.ndarray:
+def out_of_time(places: Places, swing: Swing, log: list[str], warnings: list[str]) -> np.ndarray:
     """Frames whose picture does not belong to their time stamp: repeats of the one before, and leaps along the motion."""
+    t, good = places.t_s, places.good
+    mx, my = swing.position(t)
+    rx, ry = places.x_px - mx, places.y_px - my
     vx, vy = swing.velocity(t)
     speed = np.hypot(vx, vy) + 1e-9
     along = (rx * vx + ry * vy) / speed
@@ -73,7 +69,7 @@ def out_of_time(
     again = np.abs(off + step) < 4 * noise + 0.2 * step  # where the bob was one frame before
     leap = good & (step > 6 * noise) & (again | (step > 0.3 * float(step.max())))
     leap &= (np.abs(off) > np.maximum(8 * noise, 0.5 * step)) & (np.abs(across) < 4 * noise + 0.5 * step)
-    repeats = np.array(r.repeated) & (step > 4 * noise) & good
+    repeats = places.repeated & (step > 4 * noise) & good
     if repeats.any():
         log.append(
             said(
@@ -97,79 +93,76 @@ def out_of_time(
     return leap | repeats
 
 
-def place_lost_frames(
-    t: np.ndarray,
-    x: np.ndarray,
-    y: np.ndarray,
-    swing: Swing,
-    good: np.ndarray,
-    repeated: np.ndarray,
-    warnings: list[str],
-) -> tuple[np.ndarray, Swing]:
-    """Times with the frames put back that a camera lost without a gap in its stamps, and the motion fitted to them.
+def place_lost_frames(places: Places, swing: Swing, warnings: list[str]) -> tuple[Places, Swing]:
+    """The places at times with the frames put back that a camera lost without a gap in its stamps, and the motion fitted to
+    them.
 
     A lost frame shows as a leap of the motion by one frame's time, for good; nothing else does that. A leap backwards is
-    believed where a picture repeats the one before (`repeated`, (n,) bool), else only told.
+    believed where a picture repeats the one before, else it is left to `slips_told`.
     """
-    step = float(np.median(np.diff(t)))
-    first, given, placed, odd = t.copy(), swing, 0, 0
+    stamps = places.t_s
+    step = float(np.median(np.diff(stamps)))
+    some = places.some()
+    x, y = places.x_px[some], places.y_px[some]
+    now, motion = places, swing
     when: list[float] = []
     for _ in range(6):
-        mx, my = swing.position(t)
-        slips = _for_good(clock_slips(t, x - mx, y - my, swing, good))
-        lost = [(k, f) for k, f in slips if f > 0 or (f > -1.3 and repeated[max(0, k - 1) : k + 1].any())]
-        odd = len(slips) - len(lost)
-        if not lost:
-            break
-        moved = t.copy()
+        lost = [
+            (k, f)
+            for k, f in _for_good(clock_slips(now, motion, *motion.position(now.t_s)))
+            if f > 0 or (f > -1.3 and places.repeated[max(0, k - 1) : k + 1].any())
+        ]
+        moved = now.t_s.copy()
         for k, frames in lost:
             moved[k:] += frames * step
-        some = np.flatnonzero(good)[:: max(1, int(good.sum()) // 1500)]
-        better = fit_swing(moved[some], x[some], y[some], np.full(some.size, 0.1), swing.values)
-        if better is None or better.rms_px > swing.rms_px:
-            odd += len(lost)
+        better = fit_swing(moved[some], x, y, np.full(some.size, 0.1), motion.values) if lost else None
+        if better is None or better.rms_px > motion.rms_px:
             break
-        t, swing = moved, better
-        placed += len(lost)
-        when += [float(first[k]) for k, _ in lost]
-    if placed and swing.rms_px > _PLACED * np.hypot(np.ptp(x[good]), np.ptp(y[good])):
-        t, swing, placed, odd = first, given, 0, odd + placed  # too much is amiss to know what was lost where
-    if placed:
-        warnings.append(
-            said(
-                "track.lost_frames",
-                "the camera lost or repeated frames at {frames} place(s) that the time stamps do not tell of (t = {places} s): the "
-                "motion leaps there by whole frames; times after them were moved by as much, {share:+.2%} over the clip",
-                frames=placed,
-                places=", ".join(f"{w:.2f}" for w in sorted(when)[:8]),
-                share=float((t[-1] - first[-1]) / (first[-1] - first[0])),
-            )
+        now, motion = replace(now, t_s=moved), better
+        when += [float(stamps[k]) for k, _ in lost]
+    if not when or motion.rms_px > _PLACED * places.extent_px:
+        return places, swing  # nothing is lost, or too much is amiss to know what was lost where
+    warnings.append(
+        said(
+            "track.lost_frames",
+            "the camera lost or repeated frames at {frames} place(s) that the time stamps do not tell of (t = {places} s): the "
+            "motion leaps there by whole frames; times after them were moved by as much, {share:+.2%} over the clip",
+            frames=len(when),
+            places=", ".join(f"{w:.2f}" for w in sorted(when)[:8]),
+            share=float((now.t_s[-1] - stamps[-1]) / (stamps[-1] - stamps[0])),
         )
-    if odd:
-        warnings.append(
-            said(
-                "track.clock_slips",
-                "the clock of the file slips by whole frames at {places} place(s) (a camera that lost or repeated frames and did "
-                "not say so); the error bars allow for it",
-                places=odd,
-            )
-        )
-    return t, swing
+    )
+    return now, motion
 
 
-def clock_slips(
-    t: np.ndarray, rx: np.ndarray, ry: np.ndarray, swing: Swing, good: np.ndarray
-) -> list[tuple[int, float]]:
-    """The frames from which on the motion is early (+) or late (−) for good, and by how many frames.
+def slips_told(places: Places, swing: Swing, x_px: np.ndarray, y_px: np.ndarray) -> list[str]:
+    """A sentence where the bob still leaps by whole frames from where its motion has it in the picture (n,): what tilt or
+    lens explain is no slip."""
+    slips = _for_good(clock_slips(places, swing, x_px, y_px))
+    if not slips:
+        return []
+    return [
+        said(
+            "track.clock_slips",
+            "the clock of the file slips by whole frames at {places} place(s) (a camera that lost or repeated frames and did "
+            "not say so); the error bars allow for it",
+            places=len(slips),
+        )
+    ]
+
+
+def clock_slips(places: Places, swing: Swing, x_px: np.ndarray, y_px: np.ndarray) -> list[tuple[int, float]]:
+    """The frames from which on the bob is early (+) or late (−) for good from where its motion has it (n,), and by how many
+    frames.
 
     Each place is judged by lines through the seven measured frames before and after it, where the bob is fast.
     """
-    vx, vy = swing.velocity(t)
+    vx, vy = swing.velocity(places.t_s)
     speed = np.hypot(vx, vy) + 1e-9
-    step = float(np.median(np.diff(t)))
-    ahead = (rx * vx + ry * vy) / speed**2 / step  # in frames
+    step = float(np.median(np.diff(places.t_s)))
+    ahead = ((places.x_px - x_px) * vx + (places.y_px - y_px) * vy) / speed**2 / step  # in frames
     slips: list[tuple[int, float]] = []
-    chosen = np.flatnonzero(good & (speed > 0.25 * speed.max()))
+    chosen = np.flatnonzero(places.good & (speed > 0.25 * speed.max()))
     n = 7
     if chosen.size < 4 * n:
         return slips

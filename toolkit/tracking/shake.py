@@ -12,7 +12,8 @@ from toolkit.tracking.stillness import CameraShift
 class Shake:
     """How far the camera's shake moved the bob's place on each frame, smoothed as far as its own noise asks for.
 
-    raw_x, raw_y (n,) were taken away while following (0 where the camera seemed to stand still), x, y (n,) are to be.
+    raw_x, raw_y (n,) were taken away while following (0 where the camera seemed to stand still), x, y (n,) are to be, which leaves each
+    frame `sigma` (n,) px. `taken` is False where the camera stood still.
     """
 
     def __init__(self, follower: Follower, good: np.ndarray, log: list[str]) -> None:
@@ -20,6 +21,7 @@ class Shake:
         n = len(r.index)
         self.raw_x, self.raw_y, self.sigma = np.zeros(n), np.zeros(n), np.zeros(n)
         self.x, self.y = self.raw_x, self.raw_y
+        self.taken = follower.shaking
         row = {index: k for k, index in enumerate(r.index)}
         known: dict[int, CameraShift] = {row[i]: s for i, s in follower.checks.items() if i in row}
         known |= {k: s for k, s in enumerate(r.shift) if s is not None}

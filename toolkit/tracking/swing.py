@@ -68,6 +68,15 @@ class Swing:
         speed = self.values[2] * rate
         return speed * np.cos(direction), -speed * np.sin(direction)
 
+    def values_at(self, t_s: float, fps_factor: float = 1.0) -> list[float]:
+        """The values with the state at t_s, for times divided by `fps_factor`."""
+        theta, rate = self.angle(np.array([t_s]))
+        values = self.values.copy()
+        values[7:] = theta[0], rate[0] * fps_factor
+        values[4] *= fps_factor**2
+        values[5] *= fps_factor
+        return [float(v) for v in values]
+
     def amplitude_rad(self, t_s: np.ndarray) -> float:
         """Largest |θ| at the given times."""
         return float(np.max(np.abs(self.angle(t_s)[0])))

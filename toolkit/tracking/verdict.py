@@ -9,16 +9,20 @@ import numpy as np
 from toolkit.errors import JobError
 from toolkit.sentence import said
 from toolkit.tracking.acquire import REMEDY
+from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing
 
+_POOR_PICTURE = 0.12  # of the contrast
 
-def require_pendulum(swing: Swing, t: np.ndarray, x: np.ndarray, y: np.ndarray, good: np.ndarray, path: Path) -> None:
+
+def require_pendulum(swing: Swing, places: Places, path: Path) -> None:
+    """Raises JobError where what was followed does not move like a pendulum."""
+    t, good, extent = places.t_s, places.good, places.extent_px
     span = float(t[good][-1] - t[good][0])
     if span < 0.5 * swing.period_s:
         raise JobError(
             f"{path} shows {span:.2f} s, less than half a period ({0.5 * swing.period_s:.2f} s); film at least one period"
         )
-    extent = float(np.hypot(np.ptp(x[good]), np.ptp(y[good])))
     amplitude = swing.amplitude_rad(t[good])
     reasons = []
     shaky = 0.06 if good.mean() > 0.95 else 0.04  # a hand-held camera before a plain wall: told as a warning
@@ -83,3 +87,19 @@ def poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, rms_px: float, si
         share = float(good.mean())
         poor.append(said("track.few", "the bob was measured on only {share:.0%} of the frames", share=share))
     return poor
+
+
+def poor_picture(misfit: float, even: bool, off_px: float) -> list[str]:
+    """A sentence on a bob that is no even disc: `misfit` is the share of its contrast that is not explained, `off_px` by how
+    much its centre may be off for that."""
+    if misfit <= _POOR_PICTURE and even:
+        return []
+    return [
+        said(
+            "track.poor_picture",
+            "the bob does not look like an even disc (a pattern, a highlight or a shadow: {share:.0%} of its contrast is not "
+            "explained); its centre may be off by about {off_px:.1f} px, much of it the same on all frames",
+            share=misfit,
+            off_px=off_px,
+        )
+    ]

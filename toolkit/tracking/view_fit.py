@@ -53,6 +53,11 @@ class Lines(NamedTuple):
         """Some of them, by index or mask."""
         return Lines(*(column[chosen] for column in self))
 
+    def seen(self) -> Lines | None:
+        """Those that were measured; None where they are too few to tell a pivot."""
+        measured = np.isfinite(self.half_px)
+        return self.of(measured) if measured.sum() >= 8 else None
+
 
 def fit_view(
     t_s: np.ndarray,

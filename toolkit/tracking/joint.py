@@ -1,0 +1,84 @@
+"""Error bars and the view of the camera, each of which needs the other."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from toolkit.tracking.places import Places
+from toolkit.tracking.scatter import Factors, true_sigma
+from toolkit.tracking.shake import Shake
+from toolkit.tracking.swing import Swing
+from toolkit.tracking.view import View
+from toolkit.tracking.view_fit import Lines, fit_view
+
+_SETTLED = 0.6  # a second view is fitted only where the first made σ smaller than this share of what it was fitted with
+
+
+class Camera(NamedTuple):
+    """What is known of the camera before a view is fitted: the picture's size, the pivot if given, along which axis its rows
+    are read, how far the places may be off the bob's centre, true frame rate over the file's."""
+
+    size_px: tuple[int, int]
+    pivot_px: tuple[float, float] | None
+    rows_along_x: bool
+    off_px: float
+    fps_factor: float
+
+
+class Joint(NamedTuple):
+    """The view (None where none fits), what makes σ true, and where the motion so seen has the bob, (n,) px."""
+
+    view: View | None
+    factors: Factors
+    x_px: np.ndarray
+    y_px: np.ndarray
+
+
+def fit_jointly(
+    places: Places, swing: Swing, shake: Shake, time_sigma_s: float, lines: Lines | None, camera: Camera
+) -> Joint:
+    """The camera's view of the motion, and the factors of σ about it."""
+    t, good = places.t_s, places.good
+    vx, vy = swing.velocity(t)
+    late_x, late_y = (np.hypot(v * time_sigma_s, shake.sigma) for v in (vx, vy))
+
+    def factors(x: np.ndarray, y: np.ndarray, rough: bool = False) -> Factors:
+        rx, ry = places.x_px - x, places.y_px - y
+        own = (places.sigma_x_px[good], places.sigma_y_px[good]), (vx[good], vy[good])
+        found = true_sigma((rx[good], ry[good]), *own, shake.sigma[good], time_sigma_s, rough)
+        if not shake.taken:
+            return found
+        # the picture's own places hold the shake, but not the error with which it was measured
+        shaken = (rx + shake.x)[good], (ry + shake.y)[good]
+        plain = true_sigma(shaken, *own, 0 * shake.sigma[good], time_sigma_s)
+        return Factors(min(found.x, plain.x), min(found.y, plain.y), found.shake_px)
+
+    start = np.array(swing.values_at(t[good][0], camera.fps_factor))
+    when = t / camera.fps_factor
+    mx, my = swing.position(t)
+    joint = Joint(None, factors(mx, my, rough=True), mx, my)
+    for _ in range(2):
+        scale = joint.factors
+        found = fit_view(
+            when[good],
+            places.x_px[good],
+            places.y_px[good],
+            np.sqrt((places.sigma_x_px * scale.x) ** 2 + late_x**2 + scale.shake_px**2)[good],
+            np.sqrt((places.sigma_y_px * scale.y) ** 2 + late_y**2 + scale.shake_px**2)[good],
+            start,
+            camera.size_px,
+            lines,
+            None if camera.pivot_px is None else (*camera.pivot_px, 1.0),
+            rows_along_x=camera.rows_along_x,
+            off_px=camera.off_px,
+        )
+        if found is None:
+            break
+        seen = found.position(when, joint.x_px, joint.y_px)
+        joint = Joint(found, factors(*seen), *seen)
+        after = joint.factors
+        if not found.shown or min(after.x / scale.x, after.y / scale.y) > _SETTLED:
+            break
+    return joint

@@ -1,0 +1,58 @@
+"""The motion over the whole clip, from the motion that was followed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from toolkit.errors import JobError
+from toolkit.tracking.acquire import REMEDY
+from toolkit.tracking.places import Places
+from toolkit.tracking.swing import Swing, fit_swing, start_swing
+
+_CALM = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}  # damping of a pendulum of which little is known yet
+
+
+def whole_swing(followed: Swing, places: Places, path: Path) -> Swing:
+    """The motion over the whole clip, from the one followed (on the places' clock); where that does not lead there, from
+    the places alone.
+
+    Raises JobError where no pendulum's motion goes through the places.
+    """
+    t, x, y = places.t_s, places.x_px, places.y_px
+    chosen = np.flatnonzero(places.good)
+    theta, rate = followed.angle(t[chosen[:1]])
+    values = followed.values.copy()
+    values[7:] = theta[0], rate[0]
+    swing = _grown(values, t, x, y, chosen)
+    if swing is None or swing.rms_px > 0.02 * places.extent_px:
+        first = chosen[t[chosen] < t[chosen[0]] + 1.5 * followed.period_s]
+        other = start_swing(t[first], x[first], y[first]) if first.size >= 12 else None
+        anew = None if other is None else _grown(other, t, x, y, chosen)
+        if anew is not None and (swing is None or anew.rms_px < swing.rms_px):
+            swing = anew
+    if swing is None:
+        raise JobError(f"what moves in {path} does not swing like a pendulum; if there is one, {REMEDY}")
+    return swing
+
+
+def _grown(values: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> Swing | None:
+    """The motion through the `chosen` frames, fitted in growing pieces, so that no swing is lost count of."""
+    swing: Swing | None = None
+    period = 2 * np.pi / np.sqrt(max(values[4], 1e-9))
+    stop = t[chosen[0]] + max(0.75 * period, 0.3)
+    while True:
+        part = chosen[t[chosen] <= stop]
+        if part.size >= 12:
+            p = part[:: max(1, part.size // 1500)]
+            calm = _CALM if stop < t[-1] else None
+            swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=calm)
+            if swing is None and calm is None:
+                swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=_CALM)
+            if swing is None:
+                return None
+            values = swing.values
+        if stop >= t[-1]:
+            return swing
+        stop = t[chosen[0]] + 2 * (stop - t[chosen[0]])
