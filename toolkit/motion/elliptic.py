@@ -48,7 +48,7 @@ def solve_pendulum(
 ) -> PendulumSolution:
     """Solve θ̈ = −ω_g² sin θ from θ(0), θ̇(0) at the times t_s (n,) in s, any sign.
 
-    compiled : many samples of few periods are read off one period's series by machine code.
+    compiled : many samples of few periods are read off one period's series by machine code; t_s must increase.
     θ is continuous: it grows past π when the pendulum goes over the top. Raises UsageError where ω_g ≤ 0 or a number is
     not finite.
     """
@@ -70,10 +70,9 @@ def solve_pendulum(
     period, period_lost = motion.period_s, motion.period_lost
     direction = math.copysign(1.0, omega0_rad_per_s) if motion.kind == "rotation" else 1.0
     phase0 = motion.phase0
-    theta, omega = np.empty(t.size), np.empty(t.size)
     if compiled and t.size > _MANY and np.abs(t[[0, -1]]).max() < 1000 * period:
-        _sample_period(motion, rate, direction, np.ascontiguousarray(t), theta, omega)
-        return PendulumSolution(theta, omega, motion.kind, period)
+        return PendulumSolution(*_sample_period(motion, rate, direction, t), motion.kind, period)
+    theta, omega = np.empty(t.size), np.empty(t.size)
     for part in blocks(t.size):
         now = t[part]
         count = np.rint(now / period)
@@ -92,38 +91,29 @@ def solve_pendulum(
 
 
 _MANY = 500  # samples; below, the elliptic functions themselves are as fast
-_SPACING = 0.06  # of the points of one period, in 1/ω_g: nine terms about each hold 1e-17
+_SPACING = 0.3  # of the points of one period, in 1/ω_g: the nearest singularity is π/2 away
 
 
-def _sample_period(
-    motion: _Motion, rate: float, direction: float, t: np.ndarray, theta: np.ndarray, omega: np.ndarray
-) -> None:
-    """Fill θ and θ̇ at the times t from Taylor series about equally spaced points of one period."""
-    from toolkit.motion.compiled import kernel
+def _sample_period(motion: _Motion, rate: float, direction: float, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """θ and θ̇ at the increasing times t from Taylor series about equally spaced points of one period."""
+    from toolkit.motion.compiled import address, call, kernel
+    from toolkit.motion.routes import ROW
 
     points = 2 * math.ceil(motion.period_s * rate * max(1.0, motion.kappa) / _SPACING / 2)
     phase = np.arange(-points // 2, points // 2 + 1) / points
     solution = _libration if motion.kind == "libration" else _rotation
     angle, velocity = solution(phase, motion.kappa, motion.kappa_c)
-    step = motion.period_s / points
-    series = _series(angle, velocity * (rate * step), (rate * step) ** 2)
     over = float(motion.kind == "rotation")
-    numbers = np.array([motion.period_s, motion.period_lost, motion.phase0, direction, motion.turns, over])
-    arrays = (np.array([t.size, points]), numbers, t, series, theta, omega)
-    places = np.array([array.ctypes.data for array in arrays] + [0])
-    kernel("orbit")(places[-1:].ctypes.data, None, places.ctypes.data)
-
-
-def _series(theta: np.ndarray, slope: np.ndarray, square: float) -> np.ndarray:
-    """(n, 9) Taylor coefficients of θ'' = −square·sin θ about n states."""
-    c, s, w, cosine = (np.empty((9, theta.size)) for _ in range(4))
-    c[0], w[0], s[0], cosine[0] = theta, slope, np.sin(theta), np.cos(theta)
-    for k in range(1, 9):
-        c[k] = w[k - 1] / k
-        w[k] = -square * s[k - 1] / k
-        s[k] = np.einsum("jn,jn->n", w[:k], cosine[k - 1 :: -1][:k]) / k
-        cosine[k] = -np.einsum("jn,jn->n", w[:k], s[k - 1 :: -1][:k]) / k
-    return np.ascontiguousarray(c.T)
+    period = (motion.period_s, motion.period_lost, motion.phase0, direction, motion.turns, over, rate * rate)
+    times = np.zeros(t.size + 7)  # vectors of eight may reach beyond the last one
+    times[: t.size] = t
+    out = np.empty((2, t.size))
+    arrays = (
+        np.array([t.size, points]), np.array(period), times, np.array([angle, (direction * rate) * velocity]),
+        np.empty(16 + 2 * ROW * (points + 2)), out,
+    )  # fmt: skip
+    call(kernel("orbit"), *map(address, arrays))
+    return out[0], out[1]
 
 
 def pendulum_period(theta0_rad: float, omega_g_rad_per_s: float, omega0_rad_per_s: float = 0.0) -> float:

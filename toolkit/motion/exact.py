@@ -31,7 +31,7 @@ def solve_exactly(
             return None
         from toolkit.motion.elliptic import solve_pendulum
 
-        exact = solve_pendulum(t - start_s, theta0, omega0, rate, compiled)
+        exact = solve_pendulum(t - start_s if start_s else t, theta0, omega0, rate, compiled)
         none = np.empty((t.size, 0))
         cost = SolveCost(time.process_time() - began)
         error = 4e-16 * (abs(theta0) + math.pi + abs(float(exact.theta_rad[-1])))
