@@ -27,7 +27,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from toolkit.cost._reference import ExactPendulum, solve_to_many_digits
-from toolkit.cost.integrators import Problem, measure, problems, random_problem, true_angles
+from toolkit.cost.integrators import measure
+from toolkit.cost.problems import Problem, problems, random_problem, true_angles
 from toolkit.simulate import scene_equation, scene_parameters, simulate
 
 ASKED = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from toolkit.cost import integrators
-from toolkit.cost.integrators import Measured, Run, problems, ratios, true_angles
+from toolkit.cost._peers import PEERS, peer
+from toolkit.cost._work_precision import OURS, Measured, Run, ratios
+from toolkit.cost.problems import exact_coefficients, problems, true_angles
 
 BY_NAME = {p.name: p for p in problems()}
 
@@ -23,15 +25,15 @@ def test_peers_and_we_agree_with_the_truth(name):
         theta, _, route = integrators._ours(method, problem)(1e-9)
         assert route
         assert np.max(np.abs(theta[judged] - truth)) < 1e-9
-    theta, evaluations, _ = integrators._peer("DOP853", problem)(1e-11)
+    theta, evaluations, _ = peer("DOP853", problem)(1e-11)
     assert evaluations > 100
     assert np.max(np.abs(theta[judged] - truth)) < (1e-6 if name == "S" else 1e-9)
 
 
 def test_p4_and_p3_are_the_problems_of_their_names():
-    two_alpha, beta, gravity, drive, _ = (float(x) for x in integrators._exact_coefficients(BY_NAME["P4"].scene))
+    two_alpha, beta, gravity, drive, _ = (float(x) for x in exact_coefficients(BY_NAME["P4"].scene))
     assert two_alpha / 2 == pytest.approx(1000 * gravity**0.5)
-    two_alpha, beta, gravity, drive, _ = (float(x) for x in integrators._exact_coefficients(BY_NAME["P3"].scene))
+    two_alpha, beta, gravity, drive, _ = (float(x) for x in exact_coefficients(BY_NAME["P3"].scene))
     assert (two_alpha, drive) == (0, 0)
     assert beta == pytest.approx(3e-4 * 0.5 / 0.05)
 
@@ -62,7 +64,7 @@ def test_measure_writes_tables_figure_and_text(tmp_path, monkeypatch):
     text = integrators.measure(tmp_path, quick=True)
     assert "P1: cold 2.00, warm 1.00" in text
     rows = list(csv.DictReader((tmp_path / "integrators.csv").open(encoding="utf-8")))
-    assert {r["method"] for r in rows} == {*integrators.OURS, *integrators.PEERS}
+    assert {r["method"] for r in rows} == {*OURS, *PEERS}
     assert all(float(r["error_rad"]) < 1e-2 and int(r["evaluations"]) > 0 for r in rows)
     found = {p.name for p in tmp_path.iterdir()}
     assert {"integrators.csv", "ratios.csv", "integrators.txt", "work_precision.png", "work_precision.svg"} <= found

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from toolkit.cost.integrators import Problem, random_problem, true_angles
+from toolkit.cost.problems import Problem, random_problem, true_angles
 from toolkit.scene import Environment, Pendulum, Release, Scene
 from toolkit.simulate import simulate
 
