@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any
 
 import numpy as np
+
+from toolkit.motion.compiled import address, call, kernel
+
+
+@cache
+def _kernel() -> Any:
+    return kernel("add", "toolkit.tracking._back_kernel", "the background's mean")
 
 
 class Background:
@@ -29,8 +37,17 @@ class Background:
         The bob (x, y, radius to leave out) and the string to the pivot do not count. After `most` frames old ones
         fade, so that slow changes of light are followed.
         """
-        px, py = pivot if pivot is not None else (np.nan, np.nan)
-        _compiled()(plane, self.mean, self.seen, *box, *bob, px, py, 1.0 / gain, most)
+        x0, y0, x1, y1 = box
+        bx, by, radius = bob
+        ux, uy = (pivot[0] - bx, pivot[1] - by) if pivot is not None else (0.0, 0.0)
+        length = math.sqrt(ux * ux + uy * uy) + 1e-9
+        numbers = np.array([bx - x0, by - y0, radius, ux / length, uy / length, 1 / gain, most])
+        plane = np.ascontiguousarray(plane, np.float32)
+        skipped = 4 * (y0 * self.mean.shape[1] + x0)
+        call(
+            _kernel(), plane.ctypes.data, address(self.mean) + skipped, address(self.seen) + skipped, address(numbers),
+            y1 - y0, x1 - x0, plane.shape[1], self.mean.shape[1],
+        )  # fmt: skip
 
     def window(self, x0: int, y0: int, width: int, height: int, dx: float, dy: float) -> tuple[np.ndarray, np.ndarray]:
         """Mean and seen of the pixels from (x0, y0) on, moved by a fraction of a pixel; beyond the rim the rim's."""
@@ -62,28 +79,3 @@ class Background:
             near = cv2.blur(mean * known, (width, width)) / np.maximum(weight, 1e-6)
             level = np.where(weight > 0.02, near, level)
         np.copyto(mean, level, where=known == 0)
-
-
-@cache
-def _compiled() -> Any:
-    import numba
-
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def add(plane, mean, seen, x0, y0, x1, y1, bx, by, radius, px, py, factor, most):
-        string = 0.0 if np.isnan(px) else 1.0
-        ux, uy = (px - bx, py - by) if string else (1.0, 0.0)
-        length = np.sqrt(ux * ux + uy * uy) + 1e-9
-        ux, uy = ux / length, uy / length
-        for y in range(y1 - y0):
-            row, known, new = mean[y0 + y, x0:x1], seen[y0 + y, x0:x1], plane[y, : x1 - x0]
-            dy = y0 + y - by
-            for x in range(x1 - x0):  # without a branch, so that several pixels are done at once
-                dx = x0 + x - bx
-                along = dx * ux + dy * uy
-                wide = string * (4.0 + 0.25 * max(0.0, 2 * radius - along))
-                hidden = (dx * dx + dy * dy < radius * radius) | ((along > 0) & (abs(dx * uy - dy * ux) < wide))
-                n = min(known[x] + 1.0, most)
-                row[x] += 0.0 if hidden else (new[x] * factor - row[x]) / n
-                known[x] = known[x] if hidden else n
-
-    return add

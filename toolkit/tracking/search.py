@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from toolkit.motion.compiled import address, call, kernel
+
 
 class Hypothesis(NamedTuple):
     """A round moving thing: index into the sampled frames, centre and radius in full-frame px, bob darker (−1) or
@@ -98,11 +100,11 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 24) ->
             keep = np.argpartition(length, -4000)[-4000:]
             rows, columns, length = rows[keep], columns[keep], length[keep]
         weight = np.sqrt(length / np.percentile(length, 90)).clip(0, 1)
-        nx, ny = gx[rows, columns] / length, gy[rows, columns] / length
+        edges = np.array([columns, rows, gx[rows, columns] / length, gy[rows, columns] / length, weight], float)
         for radius in radii:
             bin_size = max(1.0, radius / 7)
             for sign in (-1, 1):
-                for x, y, votes in _vote(columns, rows, nx, ny, weight, sign * radius, bin_size, picture.shape):
+                for x, y, votes in _vote(edges, sign * radius, bin_size, picture.shape):
                     score = votes / (2 * np.pi * radius)
                     u, v = (x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5
                     found.append(Hypothesis(k, u, v, radius * factor, sign, score))
@@ -131,7 +133,8 @@ def find_round_near(
     weight = np.sqrt(length / strong).clip(0, 1)
     nx, ny = gx[rows, columns] / length, gy[rows, columns] / length
     bin_size = max(1.0, radius_px / 7)
-    x, y, votes = _vote(columns, rows, nx, ny, weight, sign * radius_px, bin_size, picture.shape)[0]
+    edges = np.array([columns, rows, nx, ny, weight], float)
+    x, y, votes = _vote(edges, sign * radius_px, bin_size, picture.shape)[0]
     x, y = _centred(x, y, columns, rows, -sign * nx, -sign * ny, weight, radius_px)
     return x, y, votes / (2 * np.pi * radius_px)
 
@@ -182,60 +185,18 @@ def _distinct(found: list[Hypothesis], most: int) -> list[Hypothesis]:
     return kept
 
 
-def _vote(
-    columns: np.ndarray,
-    rows: np.ndarray,
-    nx: np.ndarray,
-    ny: np.ndarray,
-    weight: np.ndarray,
-    reach: float,
-    bin_size: float,
-    shape: tuple[int, ...],
-) -> list[tuple[float, float, float]]:
-    """The two centres (shrunken px) with most votes at signed distance `reach` along the gradient, and how many each has."""
+def _vote(edges: np.ndarray, reach: float, bin_size: float, shape: tuple[int, ...]) -> list[tuple[float, float, float]]:
+    """The two centres (shrunken px) with most votes at signed distance `reach` along the gradient, and how many each has.
+
+    edges : (5, n) the edge pixels' columns, rows, directions of the gradient (x, y) and weights.
+    """
     height, width = int(shape[0] / bin_size) + 3, int(shape[1] / bin_size) + 3
-    found = np.zeros((2, 3))
-    _compiled()(columns, rows, nx, ny, weight, reach, bin_size, height, width, found)
-    return [(float(x), float(y), float(votes)) for x, y, votes in found]
+    table, bins = np.zeros((height, width), np.float32), np.empty(edges.shape[1], np.int64)
+    numbers, found = np.array([reach, bin_size]), np.zeros((2, 3))
+    call(_kernel(), *(address(a) for a in (edges, numbers, table, bins, found)), edges.shape[1], height, width)
+    return [(x, y, votes) for x, y, votes in found.tolist()]
 
 
 @cache
-def _compiled() -> Any:
-    import numba
-
-    @numba.njit(cache=True, nogil=True)
-    def vote(columns, rows, nx, ny, weight, reach, bin_size, height, width, found):
-        # a bright bob's gradient points inwards, a dark one's outwards: `reach` carries the sign
-        table = np.zeros((height, width), np.float32)
-        for i in range(columns.size):
-            u = int(np.floor((columns[i] + reach * nx[i]) / bin_size + 0.5)) + 1
-            v = int(np.floor((rows[i] + reach * ny[i]) / bin_size + 0.5)) + 1
-            if 0 < u < width - 1 and 0 < v < height - 1:
-                table[v, u] += weight[i]
-        apart = int(abs(reach) / bin_size) + 1
-        for which in range(2):
-            best, at_u, at_v = -1.0, 1, 1
-            for v in range(1, height - 1):
-                for u in range(1, width - 1):
-                    if table[v, u] > 0:
-                        total = 0.0
-                        for b in range(-1, 2):
-                            for a in range(-1, 2):
-                                total += table[v + b, u + a]
-                        if total > best:
-                            best, at_u, at_v = total, u, v
-            sum_u = sum_v = total = 0.0
-            for b in range(-1, 2):
-                for a in range(-1, 2):
-                    w = table[at_v + b, at_u + a]
-                    sum_u += w * (at_u + a)
-                    sum_v += w * (at_v + b)
-                    total += w
-            if total <= 0:
-                return
-            found[which, 0] = (sum_u / total - 1) * bin_size
-            found[which, 1] = (sum_v / total - 1) * bin_size
-            found[which, 2] = total
-            table[max(0, at_v - apart) : at_v + apart + 1, max(0, at_u - apart) : at_u + apart + 1] = 0
-
-    return vote
+def _kernel() -> Any:
+    return kernel("vote", "toolkit.tracking._vote_kernel", "the search")

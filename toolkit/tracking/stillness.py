@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from toolkit.motion.compiled import address, call, kernel
+
 
 class CameraShift(NamedTuple):
     """Shift (px) and roll (rad) about `centre` of the picture against the first frame, and the shift's uncertainty."""
@@ -31,6 +33,11 @@ class CameraShift(NamedTuple):
 STILL = CameraShift(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _HALF = 12
 _WORST_SIGMA_PX = 0.15
+
+
+@cache
+def _kernel() -> Any:
+    return kernel("follow", "toolkit.tracking._anchor_kernel", "the camera's shift")
 
 
 class Anchors:
@@ -55,9 +62,19 @@ class Anchors:
             self.windows[k] = smooth[y - _HALF : y + _HALF + 1, x - _HALF : x + _HALF + 1]
         self.centre = (luma.shape[1] / 2, luma.shape[0] / 2)
         self._last = np.zeros((len(self.points), 2))
+        self._found = np.zeros(len(self.points))  # on how many pictures each window was
+        self._asked = 0
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def forget_passing(self) -> bool:
+        """Drop the windows that were not found again on half of the pictures: they lay on something that moves (a string). Were
+        there any?"""
+        stays = self._found >= 0.5 * self._asked
+        self.points, self.windows, self._last = self.points[stays], self.windows[stays], self._last[stays]
+        self._found = self._found[stays]
+        return not stays.all()
 
     def shift(self, luma: np.ndarray) -> CameraShift | None:
         """The camera's shift in this frame; None where the windows are too few or disagree."""
@@ -65,8 +82,13 @@ class Anchors:
         if n < 2:
             return None
         moved = np.zeros((n, 4))
-        _compiled()(luma, self.windows, self.points, self._last, moved)
+        call(
+            _kernel(), luma.ctypes.data, address(self.windows), address(self.points), address(self._last), address(moved),
+            n, self.windows.shape[1], *luma.shape, *luma.strides,
+        )  # fmt: skip
         good = moved[:, 3] > 0
+        self._found += good
+        self._asked += 1
         if good.sum() < 2:
             return None
         sigma = np.sqrt(moved[:, 2] ** 2 + 0.01**2)
@@ -116,74 +138,3 @@ def _place_sigma(smooth: np.ndarray, point: np.ndarray, noise: float) -> float:
     gy, gx = np.gradient(window)
     normal = np.array([[np.sum(gx * gx), np.sum(gx * gy)], [np.sum(gx * gy), np.sum(gy * gy)]])
     return noise / float(np.sqrt(max(np.linalg.eigvalsh(normal)[0], 1e-9)))
-
-
-@cache
-def _compiled() -> Any:
-    import numba
-
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def follow(luma, windows, points, start, moved):
-        rows, columns = luma.shape
-        size = windows.shape[1]
-        half = size // 2
-        for k in range(points.shape[0]):
-            window = windows[k]
-            n00 = n01 = n11 = 0.0
-            for v in range(1, size - 1):
-                for u in range(1, size - 1):
-                    gx = 0.5 * (window[v, u + 1] - window[v, u - 1])
-                    gy = 0.5 * (window[v + 1, u] - window[v - 1, u])
-                    n00 += gx * gx
-                    n01 += gx * gy
-                    n11 += gy * gy
-            determinant = n00 * n11 - n01 * n01
-            moved[k, 3] = 0.0
-            if not determinant > 1e-6 * n00 * n11:
-                continue
-            sx, sy = start[k, 0], start[k, 1]
-            settled = False
-            squares = 0.0
-            for _ in range(12):
-                x0 = points[k, 0] - half + sx
-                y0 = points[k, 1] - half + sy
-                ix, iy = int(np.floor(x0)), int(np.floor(y0))
-                if ix < 0 or iy < 0 or ix + size + 1 >= columns or iy + size + 1 >= rows:
-                    break
-                fx, fy = x0 - ix, y0 - iy
-                level = 0.0
-                r0 = r1 = 0.0
-                g0 = g1 = 0.0
-                squares = 0.0
-                count = 0
-                for v in range(1, size - 1):
-                    for u in range(1, size - 1):
-                        top = luma[iy + v, ix + u] * (1 - fx) + luma[iy + v, ix + u + 1] * fx
-                        bottom = luma[iy + v + 1, ix + u] * (1 - fx) + luma[iy + v + 1, ix + u + 1] * fx
-                        rest = top * (1 - fy) + bottom * fy - window[v, u]
-                        gx = 0.5 * (window[v, u + 1] - window[v, u - 1])
-                        gy = 0.5 * (window[v + 1, u] - window[v - 1, u])
-                        r0 += gx * rest
-                        r1 += gy * rest
-                        g0 += gx
-                        g1 += gy
-                        level += rest
-                        squares += rest * rest
-                        count += 1
-                level /= count
-                r0 -= level * g0
-                r1 -= level * g1
-                dx = -(r0 * n11 - r1 * n01) / determinant
-                dy = -(r1 * n00 - r0 * n01) / determinant
-                sx += min(3.0, max(-3.0, dx))
-                sy += min(3.0, max(-3.0, dy))
-                if abs(dx) < 0.01 and abs(dy) < 0.01:
-                    settled = True
-                    squares -= count * level * level
-                    break
-            if settled:
-                moved[k, 0], moved[k, 1] = sx, sy
-                moved[k, 2] = np.sqrt(squares / count * (n00 + n11) / determinant)
-                moved[k, 3] = 1.0
-
-    return follow

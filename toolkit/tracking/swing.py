@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from toolkit.motion.compiled import address, call, kernel
 from toolkit.tracking.least_squares import least_squares
 
 NAMES = ("pivot_x", "pivot_y", "length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0")
@@ -88,39 +89,21 @@ def _place(values: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 @cache
-def _compiled() -> Any:
-    import numba
-
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def swing_rk4(w2, gamma, beta, theta, rate, t, out):
-        now = 0.0
-        longest = 0.06 / np.sqrt(abs(w2) + 1e-12)
-        for i in range(t.size):
-            span = t[i] - now
-            n = int(np.ceil(abs(span) / longest))
-            h = span / n if n > 0 else 0.0
-            for _ in range(n):
-                a1 = -w2 * np.sin(theta) - (2 * gamma + beta * abs(rate)) * rate
-                v2 = rate + 0.5 * h * a1
-                a2 = -w2 * np.sin(theta + 0.5 * h * rate) - (2 * gamma + beta * abs(v2)) * v2
-                v3 = rate + 0.5 * h * a2
-                a3 = -w2 * np.sin(theta + 0.5 * h * v2) - (2 * gamma + beta * abs(v3)) * v3
-                v4 = rate + h * a3
-                a4 = -w2 * np.sin(theta + h * v3) - (2 * gamma + beta * abs(v4)) * v4
-                theta += h / 6 * (rate + 2 * v2 + 2 * v3 + v4)
-                rate += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-            now = t[i]
-            out[0, i] = theta
-            out[1, i] = rate
-
-    return swing_rk4
+def _kernel() -> Any:
+    return kernel("swing", "toolkit.tracking._swing_kernel", "the swing")
 
 
 def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """(2, n): θ and its rate at times t (n,) after that of the state in `values`, integrated from each to the next."""
-    out = np.empty((2, t.size))
-    _compiled()(values[4], values[5], values[6], values[7], values[8], np.ascontiguousarray(t), out)
-    return out
+    """(2, n): θ and its rate at times t (n,) after that of the state in `values`, integrated from each to the next.
+
+    Of several motions at once, `values` (k, 9 or more) each at its own times (k, n): (k, 2, n).
+    """
+    n = t.shape[-1]
+    room = np.empty((*t.shape[:-1], 9 + 3 * n))  # of each motion: the values, the times, the angles and their rates
+    room[..., :9] = values[..., :9]
+    room[..., 9 : 9 + n] = t
+    call(_kernel(), address(room), n, room.size // (9 + 3 * n))
+    return room[..., 9 + n :].reshape(*t.shape[:-1], 2, n)
 
 
 def fit_swing(
