@@ -67,7 +67,17 @@ def test_the_first_frame_is_shown_in_its_own_pixels():
     assert address.startswith("data:image/jpeg;base64,")
 
 
-def test_both_languages_have_the_same_words():
-    from toolkit.web.page import _WORDS
+@pytest.mark.parametrize("lang", ["en", "th"])
+def test_where_the_tracker_asks_for_a_click_the_page_says_how(lang, tmp_path):
+    from toolkit import JobError
+    from toolkit.report.words import load_words
+    from toolkit.tracking.acquire import REMEDY
+    from toolkit.web.page import _told, _Visit
 
-    assert set(_WORDS["en"]) == set(_WORDS["th"])
+    words, visit = load_words(lang), _Visit(tmp_path)
+    asked = JobError(f"nothing in {tmp_path / 'a.mp4'} moves like a pendulum; if there is one, {REMEDY}")
+    told = _told(asked, visit, words)
+    assert "a.mp4" in told
+    assert str(tmp_path) not in told
+    assert told.endswith(words("web.click_here"))
+    assert words("web.click_here") not in _told(JobError("a.mp4 is empty (0 bytes)"), visit, words)

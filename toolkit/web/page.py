@@ -20,60 +20,8 @@ from toolkit.errors import PendulabError
 from toolkit.make_report import make_report
 from toolkit.report.html import font_face
 from toolkit.report.speech import say_error
-from toolkit.report.words import load_words
+from toolkit.report.words import Words, languages, load_words
 from toolkit.scene import Environment, Pendulum, Scene
-
-_WORDS = {
-    "en": {
-        "title": "From a video of a pendulum to a report",
-        "upload": "A video, or a θ(t) file (CSV, TXT, Tracker)",
-        "clicks": "Only if the tracker asks for it: click the bob or the pivot in the first frame",
-        "bob": "bob",
-        "pivot": "pivot",
-        "forget": "Forget clicks",
-        "mass": "Mass of the bob (kg)",
-        "length": "Length from pivot to bob centre (m)",
-        "radius": "Radius of the bob (m)",
-        "gravity": "g (m/s²)",
-        "slow": "Slow motion factor",
-        "go": "Make the report",
-        "open": "Open the report",
-        "all": "Download everything (zip)",
-        "working": "Working…",
-        "trouble": "Something unexpected went wrong",
-    },
-    "th": {
-        "title": "จากวิดีโอลูกตุ้มสู่รายงาน",
-        "upload": "วิดีโอ หรือไฟล์ θ(t) (CSV, TXT, Tracker)",
-        "clicks": "เฉพาะเมื่อโปรแกรมขอ: คลิกที่ลูกตุ้มหรือจุดแขวนในเฟรมแรก",
-        "bob": "ลูกตุ้ม",
-        "pivot": "จุดแขวน",
-        "forget": "ล้างการคลิก",
-        "mass": "มวลของลูกตุ้ม (kg)",
-        "length": "ความยาวจากจุดแขวนถึงจุดศูนย์กลางลูกตุ้ม (m)",
-        "radius": "รัศมีของลูกตุ้ม (m)",
-        "gravity": "g (m/s²)",
-        "slow": "อัตราสโลว์โมชัน",
-        "go": "สร้างรายงาน",
-        "open": "เปิดรายงาน",
-        "all": "ดาวน์โหลดทั้งหมด (zip)",
-        "working": "กำลังทำงาน…",
-        "trouble": "เกิดข้อผิดพลาดที่ไม่คาดคิด",
-    },
-}
-
-_STAGES: dict[str, dict[str, str]] = {
-    "en": {},
-    "th": {
-        "searching": "กำลังหาลูกตุ้ม",
-        "tracking": "กำลังติดตามลูกตุ้ม",
-        "compiling the equations, this once": "กำลังคอมไพล์สมการ (ครั้งแรกครั้งเดียว)",
-        "fitting": "กำลังหาค่าพารามิเตอร์",
-        "writing the report": "กำลังเขียนรายงาน",
-        "writing the overlay": "กำลังเขียนวิดีโอซ้อนภาพ",
-    },
-}
-"""What the work says it is doing, where a language has its own words for it."""
 
 
 @dataclass
@@ -97,14 +45,18 @@ def build_page() -> None:
 
     ui.add_css(font_face() + 'body{font-family:Roboto,"Noto Sans Thai",sans-serif}')
     with ui.column().classes("w-full max-w-3xl mx-auto p-4 gap-4"):
-        choice = ui.toggle({"en": "English", "th": "ไทย"}, value="en").classes("self-end").mark("lang")
+        choice = (
+            ui.toggle({lang: load_words(lang)("language.name") for lang in languages()}, value="en")
+            .classes("self-end")
+            .mark("lang")
+        )
         content("en")
     choice.on_value_change(lambda event: content.refresh(event.value))
 
 
 def _content(visit: _Visit, lang: str) -> None:
-    words = _WORDS[lang]
-    ui.label(words["title"]).classes("text-2xl")
+    words = load_words(lang)
+    ui.label(words("web.title")).classes("text-2xl")
     frame_place = ui.column().classes("w-full")
 
     async def receive(event: events.UploadEventArguments) -> None:
@@ -118,34 +70,34 @@ def _content(visit: _Visit, lang: str) -> None:
                 with frame_place:
                     _frame(visit, words, picture, size)
         except PendulabError as error:
-            ui.notify(_told(error, visit, lang), type="negative", multi_line=True)
+            ui.notify(_told(error, visit, words), type="negative", multi_line=True)
 
     accept = ",".join(sorted(VIDEO_SUFFIXES | SERIES_SUFFIXES))
-    upload = ui.upload(label=words["upload"], auto_upload=True, on_upload=receive).props(f'accept="{accept}"')
+    upload = ui.upload(label=words("web.upload"), auto_upload=True, on_upload=receive).props(f'accept="{accept}"')
     upload.classes("w-full").move(target_index=1)
     with ui.row().classes("w-full"):
-        mass = ui.number(words["mass"], min=0, format="%.6g")
-        length = ui.number(words["length"], min=0, format="%.6g")
-        radius = ui.number(words["radius"], min=0, format="%.6g")
-        gravity = ui.number(words["gravity"], value=9.80665, min=0, format="%.6g")
-        slow = ui.number(words["slow"], value=1, min=0, format="%.6g")
+        mass = ui.number(words("web.mass"), min=0, format="%.6g")
+        length = ui.number(words("web.length"), min=0, format="%.6g")
+        radius = ui.number(words("web.radius"), min=0, format="%.6g")
+        gravity = ui.number(words("web.gravity"), value=9.80665, min=0, format="%.6g")
+        slow = ui.number(words("web.slow"), value=1, min=0, format="%.6g")
         for field_ in (mass, length, radius, gravity, slow):
             field_.classes("w-full sm:w-72")
     result = ui.column().classes("w-full")
 
     async def go() -> None:
         if visit.recording is None:
-            ui.notify(words["upload"])
+            ui.notify(words("web.upload"))
             return
         result.clear()
         button.disable()
         with result:
-            text = ui.label(words["working"])
+            text = ui.label(words("web.working"))
             bar = ui.linear_progress(0.0, show_value=False)
 
         def show_stage() -> None:
             stage, bar.value = visit.stage
-            text.text = _STAGES[lang].get(stage, stage) or words["working"]
+            text.text = words.either(f"web.stage.{stage}", stage) or words("web.working")
 
         timer = ui.timer(0.2, show_stage)
         try:
@@ -153,32 +105,33 @@ def _content(visit: _Visit, lang: str) -> None:
                 pendulum=Pendulum(mass.value or None, length.value or None, radius.value or None),
                 environment=Environment(g_m_per_s2=gravity.value or None),
             )
-            await _analyse(visit, scene, lang, slow.value or 1.0, result, words)
+            await _analyse(visit, scene, words, slow.value or 1.0, result)
         except Exception as error:
             if not isinstance(error, PendulabError):
                 logging.getLogger(__name__).exception("a report could not be made")
             result.clear()
             with result:
-                ui.label(_told(error, visit, lang)).classes("text-red-700 dark:text-red-300").mark("trouble")
+                ui.label(_told(error, visit, words)).classes("text-red-700 dark:text-red-300").mark("trouble")
         finally:
             timer.cancel()
             button.enable()
 
-    button = ui.button(words["go"], on_click=go).mark("go")
+    button = ui.button(words("web.go"), on_click=go).mark("go")
     button.move(target_index=-1)
     result.move(target_index=-1)
 
 
-def _told(error: Exception, visit: _Visit, lang: str) -> str:
+def _told(error: Exception, visit: _Visit, words: Words) -> str:
     """The error in the visitor's language, without the folder that their file was put into."""
     if not isinstance(error, PendulabError):
-        return f"{_WORDS[lang]['trouble']} ({type(error).__name__})"
-    return say_error(load_words(lang), str(error).replace(f"{visit.folder}{os.sep}", ""))
+        return f"{words('web.trouble')} ({type(error).__name__})"
+    told = say_error(words, str(error).replace(f"{visit.folder}{os.sep}", ""))
+    return f"{told} {words('web.click_here')}" if "--bob" in told else told
 
 
-def _frame(visit: _Visit, words: dict[str, str], picture: str, size: tuple[int, int]) -> None:
-    ui.label(words["clicks"])
-    what = ui.toggle({"bob": words["bob"], "pivot": words["pivot"]}, value="bob")
+def _frame(visit: _Visit, words: Words, picture: str, size: tuple[int, int]) -> None:
+    ui.label(words("web.clicks"))
+    what = ui.toggle({"bob": words("web.bob"), "pivot": words("web.pivot")}, value="bob")
 
     def marks() -> str:
         colours = {"bob": "#d55e00", "pivot": "#0072b2"}
@@ -197,12 +150,10 @@ def _frame(visit: _Visit, words: dict[str, str], picture: str, size: tuple[int, 
         image.content = ""
 
     image = ui.interactive_image(picture, on_mouse=click, cross=True, sanitize=False).classes("w-full").mark("frame")
-    ui.button(words["forget"], on_click=forget).props("flat")
+    ui.button(words("web.forget"), on_click=forget).props("flat")
 
 
-async def _analyse(
-    visit: _Visit, scene: Scene, lang: str, fps_factor: float, result: Any, words: dict[str, str]
-) -> None:
+async def _analyse(visit: _Visit, scene: Scene, words: Words, fps_factor: float, result: Any) -> None:
     recording = visit.recording
     assert recording is not None
     out = visit.folder / f"report-{uuid.uuid4().hex}"
@@ -214,7 +165,7 @@ async def _analyse(
         visit.stage = (stage, fraction)
 
     analysis, _ = await asyncio.to_thread(
-        lambda: make_report(recording, out, scene, lang=lang, overlay=True, progress=progress, **measuring)
+        lambda: make_report(recording, out, scene, lang=words.lang, overlay=True, progress=progress, **measuring)
     )
     archive = await asyncio.to_thread(shutil.make_archive, str(out), "zip", out)
     address = f"/results/{out.name}"
@@ -224,9 +175,9 @@ async def _analyse(
 
     result.clear()
     with result:
-        ui.link(words["open"], f"{address}/report.html", new_tab=True).mark("report")
-        ui.link(words["all"], zip_address).mark("zip")
-        ui.html(analysis_html(analysis, lang), sanitize=False)  # every text in it is escaped
+        ui.link(words("web.open"), f"{address}/report.html", new_tab=True).mark("report")
+        ui.link(words("web.all"), zip_address).mark("zip")
+        ui.html(analysis_html(analysis, words.lang), sanitize=False)  # every text in it is escaped
 
 
 def _first_frame(path: Path) -> tuple[str, tuple[int, int]]:
