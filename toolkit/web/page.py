@@ -126,7 +126,7 @@ def _told(error: Exception, visit: _Visit, words: Words) -> str:
     if not isinstance(error, PendulabError):
         return f"{words('web.trouble')} ({type(error).__name__})"
     told = say_error(words, str(error).replace(f"{visit.folder}{os.sep}", ""))
-    return f"{told} {words('web.click_here')}" if "--bob" in told else told
+    return f"{told} – {words('web.click_here')}" if "--bob" in told else told
 
 
 def _frame(visit: _Visit, words: Words, picture: str, size: tuple[int, int]) -> None:
