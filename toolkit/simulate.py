@@ -90,7 +90,6 @@ def _simulate_slack(
     scene: Scene, equation: Equation, parameters: Mapping[str, float], t: np.ndarray, accuracy_rad: float
 ) -> Trajectory:
     """The string goes slack where T < 0; taut again, the bob has lost its velocity along the string."""
-    from toolkit.motion.flight import free_flight
     from toolkit.motion.slack import solve_with_slack
 
     if scene.pendulum.mass_kg is None:
@@ -99,19 +98,8 @@ def _simulate_slack(
         raise UsageError("slack_string needs angles beyond 90°; leave out small_angle")
     began = time.process_time()
     inner = min(accuracy_rad * 1e-2, 1e-9)
-
-    def swing(start: float, theta: float, omega: float, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        part = equation.solve(parameters, theta, omega, times, inner, start_s=start)
-        return part.theta_rad, part.omega_rad_per_s
-
-    def tension(times: np.ndarray, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
-        return np.asarray(equation.terms_at(parameters, times, theta, omega).tension)
-
-    flight = free_flight(equation, parameters)
-    solution = solve_with_slack(
-        t, scene.release.theta0_rad, scene.release.omega0_rad_per_s, parameters["length_m"], flight.g_m_per_s2,
-        swing, tension, flight.acceleration, equation.fastest_rad_per_s(parameters),
-    )  # fmt: skip
+    release = scene.release
+    solution = solve_with_slack(equation, parameters, release.theta0_rad, release.omega0_rad_per_s, t, inner)
     motion = equation.terms_at(parameters, t, solution.theta_rad, solution.omega_rad_per_s)
     mass, g = parameters["mass_kg"], parameters["g_m_per_s2"]
     aloft = solution.in_flight
@@ -121,6 +109,7 @@ def _simulate_slack(
     in_air = mass * speed2 / 2 + mass * g * height
     return Trajectory(
         t, solution.theta_rad, solution.omega_rad_per_s, np.where(aloft, 0.0, motion.tension),
-        np.where(aloft, in_air, motion.energy), "swings joined by free flights", SolveCost(time.process_time() - began),
+        np.where(aloft, in_air, motion.energy), "swings joined by free flights",
+        SolveCost(time.process_time() - began, 0.0, solution.evaluations, solution.steps),
         accuracy_rad, None, solution.events, (), equation.latex, {"radius_m": solution.radius_m},
     )  # fmt: skip

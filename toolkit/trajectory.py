@@ -23,11 +23,12 @@ class SolveCost(NamedTuple):
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at a time: `slack`, `taut`, `stick`, `slip` …"""
+    """Something that happened at a time, and the state there: `slack`, `taut`, `stick`, `slip` …"""
 
     kind: str
     t_s: float
     theta_rad: float
+    omega_rad_per_s: float = 0.0
 
 
 @dataclass(frozen=True)

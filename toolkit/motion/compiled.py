@@ -103,15 +103,15 @@ def series(module: ModuleType, name: str) -> int:
 
 
 @cache
-def terms(module: ModuleType) -> int:
-    """The address of the module's terms(q, s, out) as machine code."""
+def terms(module: ModuleType, name: str = "terms") -> int:
+    """The address of the module's `terms` or `tension`, (q, s, out), as machine code."""
 
     def source() -> tuple[list[Any], Any, Any]:
         from toolkit.motion.kernels.pointer import REALS
 
-        return [REALS] * 3, False, module.terms
+        return [REALS] * 3, False, getattr(module, name)
 
-    return machine_code(f"{module.__name__}_terms", source)
+    return machine_code(f"{module.__name__}_{name}", source)
 
 
 @cache

@@ -242,7 +242,8 @@ class Equation:
             symbols(sympy_functions(), state, known, self.effects, self.small_angle, self.formula_text)
         )
         names = {"theta": theta, "w": w, "tau": tau, "scale": scale, "parameters": known}
-        return write_source(self.parameters, motion.torque, motion.inertia, names, self.latex)
+        pull = motion.tension if any(e.name == "slack_string" for e in self.effects) else None
+        return write_source(self.parameters, motion.torque, motion.inertia, names, self.latex, pull)
 
     # -- solving -------------------------------------------------------------------------------------------------
 

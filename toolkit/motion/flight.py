@@ -16,12 +16,16 @@ if TYPE_CHECKING:
     from toolkit.motion.equation import Equation
 
 
+Acceleration = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
+"""(time, position, velocity), each (right, up) from the pivot -> acceleration in m/s²."""
+
+
 @dataclass(frozen=True)
 class Flight:
-    """The downward pull in m/s², and the whole acceleration (t, position, velocity) where there is more."""
+    """The downward pull in m/s², and the whole acceleration where there is more."""
 
     g_m_per_s2: float
-    acceleration: Callable[[float, np.ndarray, np.ndarray], np.ndarray] | None
+    acceleration: Acceleration | None = None
 
 
 def free_flight(equation: Equation, parameters: Mapping[str, float]) -> Flight:

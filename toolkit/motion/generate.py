@@ -15,11 +15,14 @@ from typing import Any
 from toolkit.motion.jet import Jet, NotAnalytic
 
 
-def write_source(names: Sequence[str], torque: Any, inertia: Any, state: dict[str, Any], header: str) -> str:
+def write_source(
+    names: Sequence[str], torque: Any, inertia: Any, state: dict[str, Any], header: str, tension: Any = None
+) -> str:
     """The source of a module that solves  inertia · θ'' = torque.
 
     names : the parameters, as SymPy symbols' names in order.    state : SymPy symbols tau, theta, w, scale, and
-    `parameters` (name -> symbol); torque and inertia are written in them (t = scale·τ, ω = w/scale).
+    `parameters` (name -> symbol); torque and inertia are written in them (t = scale·τ, ω = w/scale).    tension : of the
+    string, where that is watched.
     """
     import sympy as sp
 
@@ -51,7 +54,7 @@ def write_source(names: Sequence[str], torque: Any, inertia: Any, state: dict[st
                 entries[column] = entries.get(column, 0) - factor * change
             for column in [c for c, factor in entries.items() if factor == 0]:
                 del entries[column]
-    return _Writer(names, state, sigma, size, list(basis), matrix, header).source()
+    return _Writer(names, state, sigma, size, list(basis), matrix, header, tension).source()
 
 
 def _on_one_branch(piece: Any, sigma: Any, size: Any, w: Any) -> Any:
@@ -69,16 +72,20 @@ def _on_one_branch(piece: Any, sigma: Any, size: Any, w: Any) -> Any:
 
 
 class _Writer:
-    """Writes the module: coefficients() and partials() in Python, jet(), more() and terms() for Numba."""
+    """Writes the module: coefficients() and partials() in Python, jet(), more(), terms() and tension() for Numba."""
 
-    def __init__(self, names: Sequence[str], state: Any, sigma: Any, size: Any, basis: list, matrix: list, header: str):
+    def __init__(
+        self, names: Sequence[str], state: Any, sigma: Any, size: Any, basis: list, matrix: list, header: str, pull: Any
+    ):
         self.names, self.state, self.sigma, self.size = list(names), state, sigma, size
-        self.basis, self.matrix, self.header = basis, matrix, header
+        self.basis, self.matrix, self.header, self.pull = basis, matrix, header, pull
         self.inner: dict[Any, int] = {}  # parameter-only expressions inside the basis functions
         self.inside = {state["theta"], state["w"], state["tau"], sigma, size}
 
     def source(self) -> str:
-        terms = self.terms()
+        terms = self.values("terms", self.basis)
+        if self.pull is not None:
+            terms += "\n\n" + self.values("tension", [self.pull])
         inner = dict(self.inner)
         try:
             jet = Jet(self).source()
@@ -163,15 +170,15 @@ class _Writer:
         lines += [f"    return ({' '.join(_python(value) + ',' for value in reduced)})"]
         return "\n".join(line for line in lines if line)
 
-    def terms(self) -> str:
-        """terms(q, s, out): the values of the basis functions at one point s = (τ, θ, w, σ)."""
+    def values(self, name: str, functions: Sequence[Any]) -> str:
+        """name(q, s, out): the values of functions at one point s = (τ, θ, w, σ)."""
         import sympy as sp
 
-        replaced = [self._inner_out(f) for f in self.basis]
+        replaced = [self._inner_out(f) for f in functions]
         common, reduced = sp.cse(replaced, symbols=sp.numbered_symbols("x"))
-        lines = ["def terms(q, s, out):"]
+        lines = [f"def {name}(q, s, out):"]
         lines += ["    tau, theta, w, sigma = s[0], s[1], s[2], s[3]"]
-        if any(f.has(self.size) for f in self.basis):
+        if any(f.has(self.size) for f in functions):
             lines += ["    size = max(abs(w), 1e-300)"]
         lines += [f"    {_name(symbol)} = {_python(value)}" for symbol, value in common]
         lines += [f"    out[{i}] = {_python(value)}" for i, value in enumerate(reduced)]

@@ -3,8 +3,8 @@
 An integrator is given the addresses of eleven arrays, in this order:
 
     sizes    whole numbers: rows of the equation's memory; lengths of the series of F_θ and F_w (0 absent, 1 constant,
-             2 full); switches, holds, timed (0 or 1); sensitivities; samples; order; most steps; address of the
-             equation's machine code; address of its further series, for sensitivities
+             2 full); switches, holds, timed (0 or 1); sensitivities; samples; order; most steps; addresses of the
+             equation's machine code, of its further series, for sensitivities, and of its tension, 0 where that is not watched
     q        inner constants of the equation, then the coefficients of F
     layout   where each row of the coefficient matrix starts; rows: F, F_θ, F_w, F_τ, sensitivities, error
     columns  the number of F's entries, then which basis function each entry belongs to
@@ -12,7 +12,8 @@ An integrator is given the addresses of eleven arrays, in this order:
     numbers  fastest rate, θ, w, start, tolerance, units of time in a second, then δθ, δw of each sensitivity at the start
     t        scaled times, increasing, from the start on, and seven numbers more
     out      to be filled: θ, θ', then δθ, δθ' of each sensitivity, one row of samples each, θ' per second
-    report   to be filled: status, steps, events, largest error, then (kind, τ, θ) of each event
+    report   to be filled: status, steps, events, largest error, then (kind, τ, θ, w) of each event; with the event
+             `slack` the run ends
     work     memory to work in
     table    the method's own numbers
 """
@@ -69,7 +70,7 @@ def dop853() -> Route:
     from toolkit.motion.kernels.dop853_table import TABLE
 
     def work_size(rows: int, k: int) -> int:
-        return 4 + rows + 1 + (4 + 2 * k) * (3 + 16 + 7)
+        return 4 + rows + 1 + (4 + 2 * k) * (3 + 16 + 7) + 2 * ROW + SPARE
 
     return Route("dop853", "Runge–Kutta DOP853", TABLE, work_size, 12, 0.1, 0.1, 1e-15)
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from toolkit.motion.routes import Route
 
 START = ("theta0_rad", "omega0_rad_per_s")
-_NAMES_OF_EVENTS = ("stick", "slip")
+_NAMES_OF_EVENTS = ("stick", "slip", "slack")
 
 
 class Solution(NamedTuple):
@@ -60,6 +60,7 @@ class Solver:
         start_s: float = 0.0,
         again: bool = True,
         spare_rows: int = 0,
+        until_slack: bool = False,
     ):
         t = np.ascontiguousarray(t_s, dtype=float)
         if t.ndim != 1 or (t.size and not (t[0] >= start_s and t[-1] < math.inf and (t[1:] >= t[:-1]).all())):
@@ -68,7 +69,7 @@ class Solver:
             raise UsageError(f"accuracy_rad must be positive, got {accuracy_rad}")
         self.equation, self.t_s, self.accuracy_rad = equation, t, accuracy_rad
         self.sensitivities, self.start_s, self.again = tuple(sensitivities), start_s, again
-        self.spare_rows = spare_rows
+        self.spare_rows, self.until_slack = spare_rows, until_slack
         self._none = np.empty((t.size, 0))
         self._parameters: tuple[float, ...] = ()
         self._scale = 0.0  # seconds in a unit of the integrators' time: a power of two, so that scaling rounds nothing
@@ -125,7 +126,8 @@ class Solver:
         if scale != self._scale:
             self._scale, self._by_route = scale, {}
         self._coefficients = code.coefficients(p, scale)
-        self._may_be_stiff = bool(not self.sensitivities and code.ROWS[2] and not code.HOLDS)
+        followed = self.sensitivities or self.until_slack  # what the stiff route cannot do
+        self._may_be_stiff = bool(not followed and code.ROWS[2] and not code.HOLDS)
         self._is_stiff = False
         if self._may_be_stiff and code.JACOBIAN_LENGTHS[1] == 1:  # the same for every start
             self._may_be_stiff = self._is_stiff = self._stiff_from((0.0, 1.0))
@@ -183,7 +185,7 @@ class _Work:
         tau[:count] = solver.t_s / scale
         self.sizes = _wholes(
             rows, *code.JACOBIAN_LENGTHS, code.SWITCHES, code.HOLDS, code.TIMED, k, count, 0,
-            route.most_steps, address, further,
+            route.most_steps, address, further, compiled.terms(code, "tension") if solver.until_slack else 0,
         )  # fmt: skip
         self.q = (c_double * (n_coefficients + len(self.take)))()
         self.numbers = (c_double * (6 + 2 * k))(0.0, 0.0, 0.0, solver.start_s / scale, 0.0, 1.0 / scale)
@@ -191,7 +193,7 @@ class _Work:
             self.numbers[6 + 2 * i] = float(name == START[0])
             self.numbers[7 + 2 * i] = scale if name == START[1] else 0.0
         self.shape = (2 + 2 * k + solver.spare_rows, count)
-        self.report = (c_double * (4 + 3 * routes.MOST_EVENTS))()
+        self.report = (c_double * (4 + 4 * routes.MOST_EVENTS))()
         self.loosest = route.loosest * self.accuracy
         span = 1.0 + 0.3 * float(tau[count - 1] - self.numbers[3]) if is_series or route.stages > 6 else 1.0
         self.first, self.settled = max(route.first * self.accuracy / span, route.floor), False
@@ -246,8 +248,10 @@ class _Work:
             return None
         events: tuple[Event, ...] = ()
         if found:
-            triples = zip(*[iter(self.report[4 : 4 + 3 * int(found)])] * 3)
-            events = tuple(Event(_NAMES_OF_EVENTS[int(kind)], t * self.scale, angle) for kind, t, angle in triples)
+            each = zip(*[iter(self.report[4 : 4 + 4 * int(found)])] * 4)
+            events = tuple(
+                Event(_NAMES_OF_EVENTS[int(k)], t * self.scale, angle, w / self.scale) for k, t, angle, w in each
+            )
         cost = SolveCost(time.process_time() - began, self.compile_s, evaluations, total)
         self.compile_s = 0.0
         return out, error, route.method if route.stages else f"{route.method} {order}", cost, events

@@ -14,7 +14,8 @@ from numba import njit
 from toolkit.motion.kernels import dop853_table
 from toolkit.motion.kernels.friction import held_until, leave_rest
 from toolkit.motion.kernels.pointer import call_terms, skip, unpack
-from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, TOO_MANY_STEPS
+from toolkit.motion.kernels.slack import goes_slack
+from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, ROW, TOO_MANY_STEPS
 
 _WIDE, _E = dop853_table.A.shape[1], dop853_table.D.shape[1]
 _C = dop853_table.A.size
@@ -60,6 +61,21 @@ def _stages(
         _slope(address, q, layout, columns, values, s, B, z, m, skip(K, m * i))
 
 
+@njit
+def _powers(start: float, P: Any, m: int, d: int, h: float, c: Any) -> None:
+    """The interpolant of component d by powers of the time in the step."""
+    for k in range(8):
+        c[k] = 0.0
+    for r in range(6, -1, -1):
+        c[0] += P[r * m + d]
+        for k in range(7, -1, -1):  # times p or 1 − p
+            below = c[k - 1] if k > 0 else 0.0
+            c[k] = below if r % 2 == 0 else c[k] - below
+    c[0] += start
+    for k in range(1, 8):
+        c[k] /= h**k
+
+
 def dop853(places: Any) -> None:
     """Fill `out` and `report`: see `routes`; `address` is that of the equation's terms."""
     sizes, q, layout, columns, values, numbers, t, out, report, work, table = unpack(places)
@@ -76,6 +92,7 @@ def dop853(places: Any) -> None:
     fresh = skip(z, m)
     K = skip(fresh, m)
     P = skip(K, 16 * m)
+    series = skip(P, 7 * m)
     for d in range(m):
         y[d] = numbers[4 + d] if 1 < d < m - 2 else 0.0
     y[0] = numbers[1]
@@ -89,6 +106,7 @@ def dop853(places: Any) -> None:
     report[0] = DONE
     held = True  # for the samples at the start itself
     until = now
+    falls = -1.0  # the step at whose end the string goes slack
     while report[0] == DONE:
         if held:
             while i < count and t[i] <= until:
@@ -115,10 +133,11 @@ def dop853(places: Any) -> None:
                     sign = way
                 for a in range(2):  # it sticks; it slips
                     if found < MOST_EVENTS and (a == 0 or way != 0.0):
-                        event = skip(report, 4 + 3 * found)
+                        event = skip(report, 4 + 4 * found)
                         event[0] = a
                         event[1] = now
                         event[2] = y[0]
+                        event[3] = 0.0
                         found += 1
                     now = until
                 h = 0.0
@@ -181,7 +200,8 @@ def dop853(places: Any) -> None:
             h = near
         if report[0] != DONE:
             break
-        if t[i] <= now + h:
+        watched = sizes[12] != 0 and h != falls
+        if t[i] <= now + h or watched:
             for d in range(m):  # z, the new point, was the twelfth stage
                 change = z[d] - y[d]
                 P[d] = change
@@ -194,7 +214,14 @@ def dop853(places: Any) -> None:
                     for stage in range(16):
                         v += table[_D + _E * r + stage] * K[m * stage + d]
                     P[(3 + r) * m + d] = h * v
-            while i < count and t[i] <= now + h:
+            if watched:
+                for d in range(2):
+                    _powers(y[d], P, m, d, h, skip(series, d * ROW))
+                falls = goes_slack(sizes[12], q, sign, series, 7, now, h, skip(series, 2 * ROW))
+                if 0.0 < falls < h:  # once more, to there
+                    h = falls
+                    continue
+            while i < count and t[i] <= (now if falls == 0.0 else now + h):
                 part = (t[i] - now) / h
                 for d in range(m - 2):
                     v = 0.0
@@ -202,9 +229,12 @@ def dop853(places: Any) -> None:
                         v = (v + P[r * m + d]) * (part if r % 2 == 0 else 1.0 - part)
                     out[d * count + i] = (y[d] + v) * (per_second if d % 2 else 1.0)
                 i += 1
+        if falls == 0.0:
+            h = 0.0
+        else:
+            for d in range(m):
+                y[d] = z[d]
         now += h
-        for d in range(m):
-            y[d] = z[d]
         y[m - 2] += math.copysign(0.8 * error, y[m - 2]) + 1.1e-16 * abs(y[0])
         y[m - 1] += math.copysign(0.8 * error, y[m - 1])
         worst = max(worst, abs(y[m - 2]))
@@ -212,6 +242,17 @@ def dop853(places: Any) -> None:
         if turned:
             y[1] = h = 0.0
             resting = True
+        if falls >= 0.0:
+            found = min(found, MOST_EVENTS - 1) + 1
+            event = skip(report, 4 * found)
+            event[0] = 2
+            event[1] = now
+            event[2] = y[0]
+            event[3] = y[1]
+            if i < count:  # a sample less than a rounding error beyond
+                out[i] = y[0]
+                out[count + i] = y[1] * per_second
+            break
     report[1] = steps
     report[2] = found
     report[3] = worst

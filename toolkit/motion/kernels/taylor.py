@@ -19,6 +19,7 @@ from numba import njit
 from toolkit.motion.kernels.friction import held_until, leave_rest
 from toolkit.motion.kernels.pointer import call_jet, skip, unpack
 from toolkit.motion.kernels.sampling import sample_step
+from toolkit.motion.kernels.slack import goes_slack
 from toolkit.motion.kernels.vector import evaluate_8
 from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, ROW, SPARE, TOO_MANY_STEPS
 
@@ -228,10 +229,11 @@ def taylor(places: Any) -> None:
                 s[3] = hi + lo
                 for a in range(2):  # it sticks; it slips
                     if found < MOST_EVENTS and (a == 0 or way != 0.0):
-                        event = skip(report, 4 + 3 * found)
+                        event = skip(report, 4 + 4 * found)
                         event[0] = a
                         event[1] = s[3]
                         event[2] = s[1]
+                        event[3] = 0.0
                         found += 1
                     s[3] = until
                 hi = until
@@ -268,6 +270,12 @@ def taylor(places: Any) -> None:
             if root >= 0.0:
                 h = root
                 turned = True
+        fell = -1.0
+        if sizes[12] != 0:
+            fell = goes_slack(sizes[12], q, sign, W, n, hi + lo, h, x)
+            if fell >= 0.0:
+                h = fell
+                turned = False
         if k_sens > 0:
             call_jet(sizes[11], q, s, W, R, n)
         size = 0.0  # of what carries the error through the step; the error need not be known to many digits
@@ -315,6 +323,17 @@ def taylor(places: Any) -> None:
         if turned:
             s[2] = lost[1] = 0.0
             resting = True
+        if fell >= 0.0:
+            found = min(found, MOST_EVENTS - 1) + 1
+            event = skip(report, 4 * found)
+            event[0] = 2
+            event[1] = hi + lo
+            event[2] = s[1]
+            event[3] = s[2]
+            if i < count:  # a sample less than a rounding error beyond
+                out[i] = s[1]
+                out[count + i] = s[2] * per_second
+            break
     if passed > 0.0 and report[0] == DONE:
         s[0] = hi + lo
         s[3] = sign

@@ -1,0 +1,73 @@
+"""Where a string goes slack: the first time in a step at which its tension falls below zero."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+from toolkit.motion.kernels.pointer import call_terms, skip
+from toolkit.motion.routes import ROW
+
+_PARTS = 8  # looks of a step, of which there are about twenty a swing
+
+
+@njit
+def _tension(address: int, q: Any, c: Any, n: int, now: float, x: float, s: Any) -> float:
+    w = skip(c, ROW)
+    theta, rate = c[n], w[n]
+    for k in range(n - 1, -1, -1):
+        theta = theta * x + c[k]
+        rate = rate * x + w[k]
+    s[0] = now + x
+    s[1] = theta
+    s[2] = rate
+    pull = skip(s, 4)
+    call_terms(address, q, s, pull)
+    return pull[0]
+
+
+@njit
+def goes_slack(address: int, q: Any, sign: float, c: Any, n: int, now: float, h: float, s: Any) -> float:
+    """The first time in [0, h] at which the tension is below zero, to the last digit; −1 where it never is.
+
+    address : of the equation's `tension`.    c : the series of θ, and a row on that of w, of order n.    s : room for 5.
+    """
+    s[3] = sign
+    part = h / _PARTS
+    last, here = _tension(address, q, c, n, now, -part, s), _tension(address, q, c, n, now, 0.0, s)
+    if here < 0.0:
+        return 0.0
+    for i in range(_PARTS + 1):
+        middle = part * i
+        ahead = _tension(address, q, c, n, now, middle + part, s)
+        low, high = max(middle - part, 0.0), min(middle + part, h)
+        below = middle + part if ahead < 0.0 and i < _PARTS else -1.0
+        if below < 0.0 and here <= last and here <= ahead and here < last - 2.0 * here + ahead:
+            # a minimum that a parabola through three looks would take below zero
+            left, right = low, high
+            while right - left > 1e-10 * h and below < 0.0:
+                first, second = left + 0.382 * (right - left), right - 0.382 * (right - left)
+                at_first = _tension(address, q, c, n, now, first, s)
+                at_second = _tension(address, q, c, n, now, second, s)
+                if at_first < 0.0:
+                    below = first
+                elif at_second < 0.0:
+                    below = second
+                if at_first < at_second:
+                    right = second
+                else:
+                    left = first
+        if below >= 0.0:
+            taut, slack = min(middle, below) if ahead < 0.0 and i < _PARTS else low, below
+            for _ in range(80):
+                half = 0.5 * (taut + slack)
+                if not taut < half < slack:
+                    break
+                if _tension(address, q, c, n, now, half, s) < 0.0:
+                    slack = half
+                else:
+                    taut = half
+            return slack
+        last, here = here, ahead
+    return -1.0
