@@ -48,7 +48,7 @@ _OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": True,
 }
 _once = njit(**_OPTIONS)
-_loop = njit(**_OPTIONS, fastmath={"reassoc", "contract", "nsz", "arcp"})  # sums in any order
+loop = njit(**_OPTIONS, fastmath={"reassoc", "contract", "nsz", "arcp"})  # sums in any order
 
 
 @_once
@@ -105,7 +105,7 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
     return count
 
 
-@_loop
+@loop
 def measure_depth(
     x: Any, y: Any, n: int, cx: float, cy: float, radius: float, soft: float, depth: Any, near: Any
 ) -> None:
@@ -118,7 +118,7 @@ def measure_depth(
         near[i] = one
 
 
-@_loop
+@loop
 def cover_still(depth: Any, n: int, soft: float, share: Any, rise: Any, widen: Any) -> None:
     """What a disc at rest covers of each pixel, and its slopes with the radius and with h."""
     for i in range(n):
@@ -131,7 +131,7 @@ def cover_still(depth: Any, n: int, soft: float, share: Any, rise: Any, widen: A
         widen[i] = -e * v
 
 
-@_loop
+@loop
 def cover_moving(
     depth: Any, lift: Any, n: int, part: float, soft: float, before: Any, edge: Any, whole: Any,
     share: Any, rise: Any, widen: Any,
@@ -158,7 +158,7 @@ def cover_moving(
         whole[i] = sum_
 
 
-@_loop
+@loop
 def compare(
     x: Any, y: Any, n: int, bright: Any, wall: Any, known: Any, disc: Any, shade: Any, cut: float,
     share: Any, rest: Any, work: Any,
@@ -193,7 +193,7 @@ def compare(
         tilt_y[i] *= share[i]
 
 
-@_loop
+@loop
 def add_up(work: Any, rest: Any, n: int, free: int, normal: Any, right: Any) -> None:
     """Add a chunk to the normal equations: rows of four, the lower half is what counts. Behind their right side of eight: the
     weighted sum of squares, the sum of the weights."""

@@ -1,15 +1,18 @@
 """Outline fit: the circle where the picture departs from the background, whatever is drawn on the bob.
 
-Along rays from the centre, the picture less the background is a level outside and unknown levels inside: the bob's
-shells, thinnest at its rim, for on a ball a pattern is foreshortened there to less than a pixel. These levels are random
-with a wide prior; integrated out (Gaussian marginal likelihood) they leave how likely each place of the outline is on each
-ray. The centre is the likeliest over all rays; a ray that disagrees with the others counts little (Cauchy).
+Along rays from the centre, the picture less the background is about zero outside and the bob's level inside. What is drawn
+on a ball is foreshortened at its rim to less than a pixel: a shell there may have another of the levels that are seen on
+the bob, to an unknown depth, and moves the apparent edge. Each ray is compared with every such shell at every place of the
+outline, what levels there are beside being random and integrated out (Gaussian marginal likelihood); the shell that suits
+a ray and its neighbours best says how likely the place is. The centre is the likeliest over all rays; a ray that disagrees
+with the others counts little (Cauchy).
 """
 
 from __future__ import annotations
 
 from functools import cache, lru_cache
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,13 +20,25 @@ from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, P
 
 _STEP = 0.5  # px between samples of a ray
 _SHIFTS = np.linspace(-1.8, 1.8, 25)  # places of the outline on a ray that are tried, px
-_DEPTHS = np.array([0.0, 0.4, 0.9, 1.6, 2.6, 4.0])  # where the shells begin, px within the outline
+_SHARP = np.array([-0.15, 0.15, 0.45, 0.8, 1.2])  # px: how deep a shell is tried that is as sharp as a pixel,
+_SHELLS = np.array([*_SHARP, *np.arange(0.2, 3.3, 0.3)])  # and one as blurred as the outline
+_DEEP = 3.0  # px within the outline: what lies deeper hardly counts
+_WALK = np.array([0.4, 0.9, 1.6, 2.6])  # depths at which the level within may change a little, px
+_LEVELS = 0.03, 0.3, 0.7, 0.97  # quantiles of what is seen on the bob: levels that the shell may have
+_SHELLED = 0.3  # how likely there is a shell at all
+_CHANCES = -2 * np.log(np.array([1 - _SHELLED, *np.full(_SHELLS.size, _SHELLED / _SHELLS.size)])).astype(np.float32)
+_ALIKE = 3  # neighbouring rays that see the same shell
+_TIED = 7.0  # rays that err alike, where the shell is not quite as any that is tried
 _FAR = 9.0  # what a ray may disagree by, in units of twice the log-likelihood, before it counts less
-_WIDTHS = 4  # classes of blur along the ray
-# standard deviations, the first three in units of the contrast:
-_CHANGE = 0.3  # of a shell's level against the next one's
-_OUTSIDE = 0.25  # of the level beyond the outline (a shadow)
+_STRAY = 100.0  # the same, before it counts less for which shell its neighbours see
+_BLURS = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48])  # px along a ray
+# standard deviations, all but the last two in units of the contrast:
+_WITHIN = 0.5  # of the level within the shell
+_SHELL = 0.06  # of the shell's level about one of those seen
+_CHANGE = 0.05  # of the level from one depth to the next
+_OUTSIDE = 0.1  # of the level beyond the outline (a shadow)
 _FLOOR = 0.03  # of what a codec and the edge's true shape leave
+_SOFT = 0.5  # px, of the shell's inner edge
 _RADIUS = 0.3  # px, of the radius about the look's
 
 
@@ -37,13 +52,13 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
     """The place and the radius in px; None where too little of an outline is seen."""
     import cv2
 
-    contrast = abs(look.contrast) or float(np.ptp(patch.image - patch.back))
-    if not contrast > 0:
+    contrast = look.contrast or float(np.ptp(patch.image - patch.back))
+    if not abs(contrast) > 0:
         return None
     centre = np.array([guess.x_px - patch.x_px, guess.y_px - patch.y_px], float)
-    picture = np.ascontiguousarray(patch.image - patch.back, np.float32)
+    picture = np.ascontiguousarray((patch.image - patch.back) / contrast, np.float32)
     quiet = 1.4826 * float(np.median(np.abs(picture - np.median(picture))))
-    noise = float(np.clip(quiet / contrast, _FLOOR, 0.2))
+    noise = float(2.0 ** np.round(np.log2(np.clip(quiet, _FLOOR, 0.2))))
     count = int(max(32, 2 * np.pi * look.radius_px / 0.9))
     angles = (np.arange(count) + 0.5) * 2 * np.pi / count
     if np.isfinite(guess.string_rad):
@@ -51,21 +66,14 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         angles = angles[np.abs((angles - guess.string_rad + np.pi) % (2 * np.pi) - np.pi) > half]
     ux, uy = np.cos(angles), np.sin(angles)
     streak = np.abs(guess.streak_x_px * ux + guess.streak_y_px * uy)
-    longest = float(np.round(np.hypot(guess.streak_x_px, guess.streak_y_px)))  # rounded, so that few kinds of ray occur
-    classes = (
-        np.minimum((streak / max(longest, 1e-9) * _WIDTHS).astype(int), _WIDTHS - 1)
-        if longest > 0.5
-        else 0 * angles.astype(int)
-    )
-    level = float(2.0 ** np.round(np.log2(noise)))
-    change = _CHANGE if not look.even else 0.25 * _CHANGE
     wide = max(1.0, look.radius_px / 6)
     unit, step = wide, 0.0  # coarse at first: what is drawn is mistaken for the outline less, and the reach is far
     for turn in range(10):
         if turn > 1 or (turn and step < 0.5):
             unit = 1.0
-        edge = float(round(max(look.edge_px / unit, 0.3), 2))
-        r = _grid(edge, longest / unit)
+        edge = float(round(max(look.edge_px / unit, 0.3), 1))
+        blurs = _BLURS[np.abs(streak[:, None] / unit - _BLURS).argmin(axis=1)]
+        r = _grid(edge, int(blurs.max()))
         x = centre[0] + ux[:, None] * (look.radius_px + unit * r)
         y = centre[1] + uy[:, None] * (look.radius_px + unit * r)
         inside = ((x >= 0) & (y >= 0) & (x <= picture.shape[1] - 1) & (y <= picture.shape[0] - 1))[
@@ -73,22 +81,13 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         ].all(axis=1)
         if inside.sum() < 12:
             return None
-        profile = (
-            cv2.remap(
-                picture, x.astype(np.float32), y.astype(np.float32), cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
-            )
-            / contrast
+        profile = cv2.remap(
+            picture, x.astype(np.float32), y.astype(np.float32), cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
-        cost = np.empty((angles.size, _SHIFTS.size))
-        for k in range(_WIDTHS):
-            rows = classes == k
-            if rows.any():
-                blur = float(round((k + 0.5) / _WIDTHS * longest / unit * 2) / 2) if longest > 0.5 else 0.0
-                whitened = _likelihood(edge, float(longest / unit), blur, level, change)
-                cost[rows] = _misfits(profile[rows], whitened, float(np.sign(look.contrast)))
-        least = cost.min(axis=1)
+        levels = _seen_on(picture, centre, look.radius_px - 2.5 * unit)
+        cost, least = _weigh(profile, r, edge, blurs, noise, levels, inside)
         scale = max(1.0, float(np.median(least[inside])) / r.size)
-        cost = (cost - least[:, None]) / scale
+        cost /= scale
         found, variance, apart = _likeliest(cost, ux, uy, inside)
         step = unit * float(np.hypot(found[0], found[1]))
         centre += unit * np.clip(found[:2], -1.5, 1.5)
@@ -96,7 +95,7 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
             break
     if step > 0.3:
         return None
-    sigma = np.sqrt(variance)
+    sigma = np.sqrt(_TIED * variance)
     within = profile[:, (r < -0.5 - edge) & (r > -3.0 - edge)].mean(axis=1)
     beyond = profile[:, -3:].mean(axis=1)
     seen = inside & (apart < 2 * _FAR) & (np.abs(within - beyond) > max(0.12, 3 * noise))
@@ -104,79 +103,117 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         return None
     place = Place(
         float(centre[0]) + patch.x_px, float(centre[1]) + patch.y_px, max(float(sigma[0]), 1e-4), max(float(sigma[1]), 1e-4),
-        contrast * noise * float(np.sqrt(scale)), float(seen.mean()),
+        abs(contrast) * noise * float(np.sqrt(scale)), float(seen.mean()),
         float(np.median((within - beyond)[seen])) * contrast,
     )  # fmt: skip
     return place, look.radius_px + float(found[2])
 
 
+def _seen_on(picture: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
+    """The levels seen on the bob, in units of its contrast."""
+    rows, columns = np.ogrid[: picture.shape[0], : picture.shape[1]]
+    on = picture[np.hypot(columns - centre[0], rows - centre[1]) < max(radius, 2.0)]
+    return np.quantile(on, _LEVELS).astype(np.float32) if on.size > 8 else np.ones(len(_LEVELS), np.float32)
+
+
+def _grid(edge: float, blur: int) -> np.ndarray:
+    """Where rays are sampled, px beyond the outline."""
+    reach = 2.2 * edge + 0.5 * blur
+    return np.arange(np.floor((-_DEEP - min(reach, 3.0)) / _STEP), np.ceil((reach + 2.0) / _STEP) + 1) * _STEP
+
+
+class _Model(NamedTuple):
+    """For each place of the outline and each shell (none first), (m, …): what makes profiles white noise, what a level of 1
+    within the shell and of 1 in it become by that, and the volume's logarithm."""
+
+    whiten: np.ndarray
+    within: np.ndarray
+    shell: np.ndarray
+    volume: np.ndarray
+    first_px: float  # the first sample, beyond the outline
+
+
+@lru_cache(maxsize=64)
+def _model(edge: float, blur: int, noise: float) -> _Model:
+    from scipy.special import ndtr
+
+    r = _grid(edge, blur)
+    ends = np.linspace(-0.5, 0.5, 1 + 2 * blur) * blur
+
+    def covered(rims: np.ndarray, sigma: float) -> np.ndarray:
+        return np.asarray(ndtr((rims[..., None, None] + ends - r[:, None]) / sigma).mean(axis=-1))
+
+    shift, depth = np.repeat(_SHIFTS, 1 + _SHELLS.size), np.tile([-np.inf, *_SHELLS], _SHIFTS.size)
+    sharp = np.tile([False, *(np.arange(_SHELLS.size) < _SHARP.size)], _SHIFTS.size)[:, None]
+    disc = covered(shift, edge)
+    core = np.where(sharp, disc * covered(shift - depth, _SOFT), covered(shift - depth, edge))
+    within, shell = core, disc - core
+    changes = [_CHANGE * core * covered(shift - d, edge) for d in _WALK]
+    random = np.stack([_WITHIN * within, _SHELL * shell, _OUTSIDE * (1 - disc), *changes], axis=-1)
+    spread = random @ random.transpose(0, 2, 1) + noise**2 * 0.5 ** (np.abs(r[:, None] - r) / 0.5)
+    spread[:, r < -_DEEP, r < -_DEEP] += 1.0
+    lower = np.linalg.cholesky(spread)
+    whiten = np.linalg.inv(lower)
+    volume = 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+    parts = (whiten, (whiten @ within[..., None])[..., 0], (whiten @ shell[..., None])[..., 0], volume - volume.min())
+    a, b, c, d = (np.where(np.abs(p) < 1e-9, 0, p).astype(np.float32) for p in parts)  # denormal numbers are slow
+    return _Model(a, b, c, d, float(r[0]))
+
+
+def _weigh(
+    profile: np.ndarray,
+    r: np.ndarray,
+    edge: float,
+    blurs: np.ndarray,
+    noise: float,
+    levels: np.ndarray,
+    inside: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Minus twice the log-likelihood of each place of the outline, (rays, places), by the shell that suits the ray and its
+    neighbours best; and each ray's least misfit."""
+    from toolkit.motion.compiled import address, call
+
+    rays, kinds = len(profile), _SHIFTS.size * (1 + _SHELLS.size)
+    ends = np.flatnonzero(np.diff(blurs, prepend=-1, append=-1))
+    runs = []
+    for begin, end in pairwise(ends.tolist()):
+        model = _model(edge, int(blurs[begin]), noise)
+        size = model.within.shape[1]
+        runs.append((begin, end, round((model.first_px - r[0]) / _STEP), size, *(address(a) for a in model[:4])))
+    arrays = (
+        np.ascontiguousarray(profile.T),
+        np.array(runs, np.int64),
+        np.array([*levels, levels.mean(), _STRAY], np.float32),
+        _CHANCES,
+        inside.astype(np.float32),
+        np.empty(levels.size * kinds * rays + 4 * rays + _ALIKE, np.float32),
+        np.empty((rays, _SHIFTS.size)),
+        np.empty(rays, np.float32),
+    )
+    counts = (rays, len(runs), levels.size, _SHIFTS.size, 1 + _SHELLS.size, _ALIKE)
+    call(_kernel("weigh_places", "_rim_kernel"), *(address(a) for a in arrays), *counts)
+    return arrays[6], arrays[7]
+
+
 @cache
-def _kernel() -> Any:
+def _kernel(name: str, module: str) -> Any:
     from toolkit.motion.compiled import kernel
 
-    return kernel("likeliest", "toolkit.trackers._outline_kernel", "the outline fit")
+    return kernel(name, f"toolkit.trackers.{module}", "the outline fit")
 
 
 def _likeliest(
     cost: np.ndarray, ux: np.ndarray, uy: np.ndarray, inside: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """x, y and radius (px off the present ones) of the least robust sum, their variances, and each ray's misfit there."""
+    from toolkit.motion.compiled import address, call
+
     numbers = np.zeros(64)
     numbers[:4] = _SHIFTS[0], _SHIFTS[1] - _SHIFTS[0], _FAR, _RADIUS
     result, apart = np.empty(6), np.empty(ux.size)
     arrays = (np.ascontiguousarray(cost), ux, uy, inside.astype(float), numbers, result, apart)
-    places = np.array([*(a.ctypes.data for a in arrays), *cost.shape, 0], np.int64)
-    _kernel()(places[-1:].ctypes.data, None, places.ctypes.data)
+    call(_kernel("likeliest", "_outline_kernel"), *(address(a) for a in arrays), *cost.shape)
     return result[:3], result[3:], apart
-
-
-def _grid(edge: float, longest: float) -> np.ndarray:
-    """Where rays are sampled, px beyond the outline."""
-    reach = 2.2 * edge + 0.5 * longest
-    return np.arange(-_DEPTHS[-1] - min(reach, 3.0), reach + 2.6, _STEP)
-
-
-def _misfits(profile: np.ndarray, whitened: tuple[np.ndarray, np.ndarray, np.ndarray], sign: float) -> np.ndarray:
-    """Minus twice the log-likelihood of each place of the outline, (rays, places), up to a constant."""
-    whiten, mean, volume = whitened
-    places, size, _ = whiten.shape
-    # laid out anew: a transposed view takes OpenBLAS a hundred times as long
-    white = whiten.reshape(places * size, size) @ np.ascontiguousarray(profile.T)
-    white -= np.float32(sign) * mean.reshape(-1, 1)
-    white *= white
-    return np.asarray(white.reshape(places, size, -1).sum(axis=1).T + volume, float)
-
-
-@lru_cache(maxsize=64)
-def _likelihood(
-    edge: float, longest: float, blur: float, noise: float, change: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """For each place of the outline: what makes its profiles white noise, the mean so treated, and the volume's logarithm.
-    All in units of the contrast."""
-    from scipy.special import erf
-
-    r = _grid(edge, longest)
-    ends = np.linspace(-0.5, 0.5, 1 + 2 * int(np.ceil(blur))) * blur
-
-    def covered(rim: float) -> np.ndarray:
-        return np.mean([0.5 + 0.5 * erf((rim + e - r) / (edge * np.sqrt(2))) for e in ends], axis=0)
-
-    walk = np.tril(np.ones((_DEPTHS.size, _DEPTHS.size)))  # each shell's level is the one's beyond it, changed
-    levels = walk @ np.diag([0.5, *([change] * (_DEPTHS.size - 1))]) ** 2 @ walk.T
-    whiten, mean, volume = [], [], []
-    for shift in _SHIFTS:
-        rims = np.array([covered(shift - d) for d in _DEPTHS])
-        shells = rims - np.vstack([rims[1:], np.zeros(r.size)])
-        beyond = 1 - rims[0]
-        spread = shells.T @ levels @ shells + _OUTSIDE**2 * np.outer(beyond, beyond)
-        spread += noise**2 * (0.5 ** (np.abs(r[:, None] - r) / 0.5))
-        lower = np.linalg.cholesky(spread)
-        inverse = np.linalg.inv(lower)
-        whiten.append(inverse)
-        mean.append(inverse @ rims[0])
-        volume.append(2 * np.log(np.diag(lower)).sum())
-    plain = [np.where(np.abs(a) < 1e-9, 0, a).astype(np.float32) for a in (whiten, mean)]  # denormal numbers are slow
-    return plain[0], plain[1], np.array(volume)
 
 
 LOCALISER = Localiser("edge", "likeliest outline before the background; for bobs with a pattern or a highlight", locate)
