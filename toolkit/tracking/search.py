@@ -86,6 +86,7 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 24) ->
     if not moving.any():
         return []
     found: list[Hypothesis] = []
+    table = _table(stack.shape[1:], 1.0)
     biggest = 0.2 * min(stack.shape[1:])
     radii = [r for r in 2.5 * 1.25 ** np.arange(16) if r <= biggest]
     for k, picture in enumerate(samples):
@@ -104,7 +105,7 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 24) ->
         for radius in radii:
             bin_size = max(1.0, radius / 7)
             for sign in (-1, 1):
-                for x, y, votes in _vote(edges, sign * radius, bin_size, picture.shape):
+                for x, y, votes in _vote(edges, sign * radius, bin_size, picture.shape, table):
                     score = votes / (2 * np.pi * radius)
                     u, v = (x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5
                     found.append(Hypothesis(k, u, v, radius * factor, sign, score))
@@ -134,7 +135,7 @@ def find_round_near(
     nx, ny = gx[rows, columns] / length, gy[rows, columns] / length
     bin_size = max(1.0, radius_px / 7)
     edges = np.array([columns, rows, nx, ny, weight], float)
-    x, y, votes = _vote(edges, sign * radius_px, bin_size, picture.shape)[0]
+    x, y, votes = _vote(edges, sign * radius_px, bin_size, picture.shape, _table(picture.shape, bin_size))[0]
     x, y = _centred(x, y, columns, rows, -sign * nx, -sign * ny, weight, radius_px)
     return x, y, votes / (2 * np.pi * radius_px)
 
@@ -185,16 +186,28 @@ def _distinct(found: list[Hypothesis], most: int) -> list[Hypothesis]:
     return kept
 
 
-def _vote(edges: np.ndarray, reach: float, bin_size: float, shape: tuple[int, ...]) -> list[tuple[float, float, float]]:
+def _vote(
+    edges: np.ndarray, reach: float, bin_size: float, shape: tuple[int, ...], table: np.ndarray
+) -> list[tuple[float, float, float]]:
     """The two centres (shrunken px) with most votes at signed distance `reach` along the gradient, and how many each has.
 
-    edges : (5, n) the edge pixels' columns, rows, directions of the gradient (x, y) and weights.
+    edges : (5, n) the edge pixels' columns, rows, directions of the gradient (x, y) and weights.    table : all zero, and
+    left so.
     """
-    height, width = int(shape[0] / bin_size) + 3, int(shape[1] / bin_size) + 3
-    table, bins = np.zeros((height, width), np.float32), np.empty(edges.shape[1], np.int64)
+    height, width = _bins(shape, bin_size)
+    bins = np.empty(edges.shape[1], np.int64)
     numbers, found = np.array([reach, bin_size]), np.zeros((2, 3))
     call(_kernel(), *(address(a) for a in (edges, numbers, table, bins, found)), edges.shape[1], height, width)
     return [(x, y, votes) for x, y, votes in found.tolist()]
+
+
+def _bins(shape: tuple[int, ...], bin_size: float) -> tuple[int, int]:
+    return int(shape[0] / bin_size) + 3, int(shape[1] / bin_size) + 3
+
+
+def _table(shape: tuple[int, ...], bin_size: float) -> np.ndarray:
+    """Room for the votes in a picture of this shape, and bins of this size or larger."""
+    return np.zeros(_bins(shape, bin_size), np.float32)
 
 
 @cache
