@@ -126,14 +126,36 @@ def kernel(name: str, module: str = "", what: str = "") -> Callable[[int, None, 
 
         return [WHOLES], False, getattr(importlib.import_module(module or f"toolkit.motion.kernels.{name}"), name)
 
-    folder = Path(__file__).parent
-    files = [folder / "routes.py", *sorted((folder / "kernels").glob("*.py"))]
+    files = _kernel_files()
     if module:
-        file = folder.parents[1].joinpath(*module.split(".")).with_suffix(".py")
-        files = [folder / "kernels" / "pointer.py", *sorted(file.parent.glob("_*.py"))]  # one kernel may use another
+        file = Path(__file__).parents[2].joinpath(*module.split(".")).with_suffix(".py")
+        files = [
+            Path(__file__).parent / "kernels" / "pointer.py",
+            *sorted(file.parent.glob("_*.py")),
+        ]  # one kernel may use another
     texts = [file.read_bytes() for file in files]
     address = machine_code(f"{name}_{key_of(*texts)}", source, what or "the equation of motion")
     return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
+
+
+@cache
+def slack_search() -> int:
+    """The address of `slack` of kernels/slack.py as machine code, for integrators to call."""
+
+    def source() -> tuple[list[Any], Any, Any]:
+        from numba import types
+
+        from toolkit.motion.kernels.pointer import REALS
+        from toolkit.motion.kernels.slack import slack
+
+        return [types.int64, REALS, REALS, REALS, types.int64], False, slack
+
+    return machine_code(f"slack_{key_of(*[file.read_bytes() for file in _kernel_files()])}", source)
+
+
+def _kernel_files() -> list[Path]:
+    folder = Path(__file__).parent
+    return [folder / "routes.py", *sorted((folder / "kernels").glob("*.py"))]
 
 
 def address(array: Any) -> int:

@@ -4,7 +4,8 @@ An integrator is given the addresses of eleven arrays, in this order:
 
     sizes    whole numbers: rows of the equation's memory; lengths of the series of F_θ and F_w (0 absent, 1 constant,
              2 full); switches, holds, timed (0 or 1); sensitivities; samples; order; most steps; addresses of the
-             equation's machine code, of its further series, for sensitivities, and of its tension, 0 where that is not watched
+             equation's machine code, of its further series, for sensitivities, of its tension, 0 where that is not watched,
+             and of the search for the time at which it vanishes
     q        inner constants of the equation, then the coefficients of F
     layout   where each row of the coefficient matrix starts; rows: F, F_θ, F_w, F_τ, sensitivities, error
     columns  the number of F's entries, then which basis function each entry belongs to

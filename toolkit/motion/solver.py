@@ -175,6 +175,7 @@ class _Work:
         self.integrate = compiled.kernel(route.kernel)
         address = compiled.series(code, "jet") if is_series else compiled.terms(code)
         further = compiled.series(code, "more") if is_series and k else 0
+        watched = (compiled.terms(code, "tension"), compiled.slack_search()) if solver.until_slack else (0, 0)
         self.compile_s = time.process_time() - began
         self.code, self.route, self.scale = code, route, scale
         self.accuracy, self.again = solver.accuracy_rad, solver.again
@@ -185,7 +186,7 @@ class _Work:
         tau[:count] = solver.t_s / scale
         self.sizes = _wholes(
             rows, *code.JACOBIAN_LENGTHS, code.SWITCHES, code.HOLDS, code.TIMED, k, count, 0,
-            route.most_steps, address, further, compiled.terms(code, "tension") if solver.until_slack else 0,
+            route.most_steps, address, further, *watched,
         )  # fmt: skip
         self.q = (c_double * (n_coefficients + len(self.take)))()
         self.numbers = (c_double * (6 + 2 * k))(0.0, 0.0, 0.0, solver.start_s / scale, 0.0, 1.0 / scale)

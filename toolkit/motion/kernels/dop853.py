@@ -13,8 +13,7 @@ from numba import njit
 
 from toolkit.motion.kernels import dop853_table
 from toolkit.motion.kernels.friction import held_until, leave_rest
-from toolkit.motion.kernels.pointer import call_terms, skip, unpack
-from toolkit.motion.kernels.slack import goes_slack
+from toolkit.motion.kernels.pointer import call_slack, call_terms, skip, unpack
 from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, ROW, TOO_MANY_STEPS
 
 _WIDE, _E = dop853_table.A.shape[1], dop853_table.D.shape[1]
@@ -217,7 +216,12 @@ def dop853(places: Any) -> None:
             if watched:
                 for d in range(2):
                     _powers(y[d], P, m, d, h, skip(series, d * ROW))
-                falls = goes_slack(sizes[12], q, sign, series, 7, now, h, skip(series, 2 * ROW))
+                room = skip(series, 2 * ROW)
+                room[0] = now
+                room[1] = h
+                room[3] = sign
+                call_slack(sizes[13], sizes[12], q, room, series, 7)
+                falls = room[2]
                 if 0.0 < falls < h:  # once more, to there
                     h = falls
                     continue

@@ -81,6 +81,13 @@ def call_jet(typing: Any, address: Any, q: Any, s: Any, work: Any, reciprocals: 
 
 
 @intrinsic
+def call_slack(typing: Any, address: Any, tension: Any, q: Any, s: Any, series: Any, order: Any) -> Any:
+    """Call slack(tension, q, s, series, n) at `address`."""
+    signature = types.void(types.int64, types.int64, REALS, REALS, REALS, types.int64)
+    return signature, lambda context, builder, _, values: _call(builder, values)
+
+
+@intrinsic
 def call_terms(typing: Any, address: Any, q: Any, s: Any, out: Any) -> Any:
     """Call terms(q, s, out) at `address`."""
     signature = types.void(types.int64, REALS, REALS, REALS)

@@ -1,4 +1,7 @@
-"""Where a string goes slack: the first time in a step at which its tension falls below zero."""
+"""Where a string goes slack: the first time in a step at which its tension falls below zero.
+
+Compiled by itself and called by its address, so that integrators compile no longer for it.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +30,17 @@ def _tension(address: int, q: Any, c: Any, n: int, now: float, x: float, s: Any)
     return pull[0]
 
 
-@njit
-def goes_slack(address: int, q: Any, sign: float, c: Any, n: int, now: float, h: float, s: Any) -> float:
-    """The first time in [0, h] at which the tension is below zero, to the last digit; −1 where it never is.
+def slack(address: int, q: Any, s: Any, c: Any, n: int) -> None:
+    """Put into s[2] the first time in [0, h] at which the tension is below zero, to the last digit; −1 where it never is.
 
-    address : of the equation's `tension`.    c : the series of θ, and a row on that of w, of order n.    s : room for 5.
+    address : of the equation's `tension`.    s : the present time, h, ·, the sign of w, and room for two.    c : the
+    series of θ, and a row on that of w, of order n.
     """
-    s[3] = sign
+    s[2] = _first(address, q, s, c, n, s[0], s[1])
+
+
+@njit
+def _first(address: int, q: Any, s: Any, c: Any, n: int, now: float, h: float) -> float:
     part = h / _PARTS
     last, here = _tension(address, q, c, n, now, -part, s), _tension(address, q, c, n, now, 0.0, s)
     if here < 0.0:

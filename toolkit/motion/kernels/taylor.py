@@ -17,9 +17,8 @@ from typing import Any
 from numba import njit
 
 from toolkit.motion.kernels.friction import held_until, leave_rest
-from toolkit.motion.kernels.pointer import call_jet, skip, unpack
+from toolkit.motion.kernels.pointer import call_jet, call_slack, skip, unpack
 from toolkit.motion.kernels.sampling import sample_step
-from toolkit.motion.kernels.slack import goes_slack
 from toolkit.motion.kernels.vector import evaluate_8
 from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, ROW, SPARE, TOO_MANY_STEPS
 
@@ -272,7 +271,11 @@ def taylor(places: Any) -> None:
                 turned = True
         fell = -1.0
         if sizes[12] != 0:
-            fell = goes_slack(sizes[12], q, sign, W, n, hi + lo, h, x)
+            x[0] = hi + lo
+            x[1] = h
+            x[3] = sign
+            call_slack(sizes[13], sizes[12], q, x, W, n)
+            fell = x[2]
             if fell >= 0.0:
                 h = fell
                 turned = False
