@@ -23,6 +23,7 @@ H_PER_SIGMA = 3.2089677624128700
 K0, K1, K2, K3, K4 = _A, _B - 2 * _A, _A - 2 * _B + _C, _B - 2 * _C, _C
 E0, E1, E2, E3, E4 = K0, K1 / 3, K2 / 5, K3 / 7, K4 / 9
 I0, I1, I2, I3, I4 = E0 / 2, E1 / 4, E2 / 6, E3 / 8, E4 / 10
+STILL = 0.05  # px: the step after such a one is under a fiftieth of it
 MARGIN = 0.8  # px that the outline may move before the pixels are listed anew
 SECTORS = 24
 _P = 8  # parameters: cx, cy, three of the shade, gain, R, h
@@ -103,6 +104,22 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
             if abs(column - cx) < hole:
                 column = math.ceil(cx + hole) if skips else column + (column & 1)
     return count
+
+
+@loop
+def mean(values: Any, n: int) -> float:
+    total = 0.0
+    for i in range(n):
+        total += values[i]
+    return total / n
+
+
+@loop
+def largest(values: Any, n: int) -> float:
+    most = 0.0
+    for i in range(n):
+        most = abs(values[i]) if abs(values[i]) > most else most
+    return most
 
 
 @loop
@@ -324,9 +341,6 @@ def fit(places: Any) -> None:
     first = 0 if contrast != 0.0 else 1  # the first turn on which the centre moves
     cut, count, level, damp, settled = math.inf, 0, 0.0, 1.0, False
     for turn in range(places[TURNS] + first):
-        if turn >= first + 1:
-            cut = 0.25 * abs(shade[0] - shade[3] * level)
-            cut = cut if cut > 5.0 * noise else 5.0 * noise
         moved = False
         for k in range(4):
             moved = moved or not abs(disc[k] - listed[k]) < 0.75 * MARGIN
@@ -337,8 +351,7 @@ def fit(places: Any) -> None:
             for k in range(4):
                 listed[k] = disc[k]
         if turn == 0:
-            for i in range(count):
-                level += lists[_WALL * most + i] / count
+            level = mean(skip(lists, _WALL * most), count)
             if first == 0:
                 shade[0], shade[3] = level + contrast, 1.0
         for k in range(_DISC - _NORMAL):
@@ -378,7 +391,7 @@ def fit(places: Any) -> None:
             shade[k] += damp * step[2 + k]
         disc[0] += damp * step[0]
         disc[1] += damp * step[1]
-        still = size < 0.03
+        still = size < STILL
         if free > 6:
             grown = damp * step[6] / radius
             disc[2] *= 1.0 + (0.2 if grown > 0.2 else -0.2 if grown < -0.2 else grown)
@@ -390,8 +403,12 @@ def fit(places: Any) -> None:
         if not (0.0 <= disc[0] <= places[COLUMNS] - 1.0 and 0.0 <= disc[1] <= places[ROWS] - 1.0):
             return
         settled = still or free == 8 or (damp == 1.0 and size < 0.3)
-        if still and cut < math.inf:
+        limit = 0.25 * abs(shade[0] - shade[3] * level)
+        limit = limit if limit > 5.0 * noise else 5.0 * noise
+        if still and (cut < math.inf or largest(skip(lists, _REST * most), count) <= limit):
             break
+        if turn >= first:
+            cut = limit
     clean = 0.12 * abs(shade[0] - shade[3] * level)
     clean = clean if clean > 5.0 * noise else 5.0 * noise
     look_around(lists, most, count, disc, clean, skip(work, _SECTORS), out)

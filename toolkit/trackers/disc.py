@@ -13,6 +13,7 @@ import ctypes
 import threading
 from functools import cache
 from math import cos, isnan, sin, sqrt
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -43,16 +44,17 @@ def locate(patch: Patch, look: Look, guess: Guess) -> Place:
     return Place(cx + patch.x_px, cy + patch.y_px, sqrt(xx), sqrt(yy), misfit, visible, contrast, gain * wall)
 
 
-_KNOWN, _RESULTS, _PLACES = 11, 14, 15  # numbers that the kernel takes and gives, and places that it takes
+_GIVEN, _FOUND, _PLACES = Struct("11d"), Struct("14d"), Struct("15q")  # what the kernel takes and gives, and its places
 _SPARE = 4096  # numbers that it needs beside its seven lists of pixels, and more
+_SINGLE = np.dtype(np.float32)
 
 
 class _Desk(threading.local):
     """What one thread works on from frame to frame."""
 
     def __init__(self) -> None:
-        self.numbers = (ctypes.c_double * (_KNOWN + _RESULTS))()
-        self.places = (ctypes.c_int64 * _PLACES)()
+        self.numbers = ctypes.create_string_buffer(_GIVEN.size + _FOUND.size)
+        self.places = ctypes.create_string_buffer(_PLACES.size)
         self.room = np.empty(0)
         self.at = ctypes.addressof(self.places)
         self.numbers_at, self.room_at = ctypes.addressof(self.numbers), 0
@@ -75,31 +77,26 @@ def _kernel() -> Any:
 
 def _fit(
     patch: Patch, look: Look, guess: Guess, free: int, turns: int, soften: float, contrast: float
-) -> list[float] | None:
+) -> tuple[float, ...] | None:
     desk, (rows, columns) = _desk, patch.image.shape
     desk.provide(rows * columns)
     string = 0.0, 0.0, 1.0
     if not isnan(guess.string_rad):
         string = cos(guess.string_rad), sin(guess.string_rad), cos(min(0.9, 0.2 + 3.0 / look.radius_px)) ** 2
-    desk.numbers[:_KNOWN] = [
-        guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften,
+    _GIVEN.pack_into(
+        desk.numbers, 0, guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften,
         guess.streak_x_px, guess.streak_y_px, *string, look.noise, contrast,
-    ]  # fmt: skip
+    )  # fmt: skip
     image, back, seen = (
-        p if p.strides[1] == 4 and p.dtype == np.float32 else np.ascontiguousarray(p, np.float32) for p in patch[:3]
+        p if p.strides[1] == 4 and p.dtype is _SINGLE else np.ascontiguousarray(p, np.float32) for p in patch[:3]
     )
-    desk.places[:] = [
-        _address(image), _address(back), _address(seen), desk.numbers_at, desk.room_at, rows, columns,
+    _PLACES.pack_into(
+        desk.places, 0, image.ctypes.data, back.ctypes.data, seen.ctypes.data, desk.numbers_at, desk.room_at, rows, columns,
         image.strides[0] // 4, back.strides[0] // 4, seen.strides[0] // 4, free, look.even, turns, rows * columns, 0,
-    ]  # fmt: skip
-    _kernel()(desk.at + 8 * (_PLACES - 1), None, desk.at)
-    out = desk.numbers[_KNOWN:]
+    )  # fmt: skip
+    _kernel()(desk.at + _PLACES.size - 8, None, desk.at)
+    out = _FOUND.unpack_from(desk.numbers, _GIVEN.size)
     return None if isnan(out[0]) else out
-
-
-def _address(picture: np.ndarray) -> int:
-    address: int = picture.__array_interface__["data"][0]
-    return address
 
 
 LOCALISER = Localiser("disc", "least squares of a shaded disc with a soft edge and motion blur (default)", locate)
