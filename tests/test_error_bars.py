@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolkit.tracking.scatter import true_sigma
+from toolkit.tracking.scatter import quick_scatter, true_sigma
 from toolkit.tracking.string_line import measure_string, seen_half
 
 N = 400
@@ -13,9 +13,9 @@ T = np.arange(N) / 60
 VX, VY = 500 * np.cos(5 * T), 120 * np.sin(10 * T)
 
 
-def factors(rx, ry, time_sigma=0.0, known=0.0):
+def factors(rx, ry, time_sigma=0.0, known=0.0, unsteady=np.inf):
     one = np.ones(N)
-    return true_sigma((rx, ry), (0.02 * one, 0.02 * one), (VX, VY), known * one, time_sigma)
+    return true_sigma(T, (rx, ry), (0.02 * one, 0.02 * one), (VX, VY), known * one, time_sigma, unsteady)
 
 
 def test_quick_and_slow_errors_of_a_localiser_both_count():
@@ -35,6 +35,27 @@ def test_a_shaking_camera_is_told_from_the_localiser_by_what_is_across_the_motio
     found = factors(*(quick + shake))
     assert (found.x, found.y) == (pytest.approx(1.5, rel=0.25), pytest.approx(1.5, rel=0.25))
     assert found.shake_px == pytest.approx(1.0, rel=0.3)
+
+
+def test_before_a_camera_that_stood_still_slow_errors_are_the_localisers():
+    rng = np.random.default_rng(3)
+    quick = rng.normal(0, 0.03, (2, N))
+    pattern = 0.5 * np.sin(np.outer([3.0, 4.0], T)) * np.sqrt(2)  # a pattern that turns
+    found = factors(*(quick + pattern), unsteady=0.03)
+    assert (found.x, found.y) == (pytest.approx(25, rel=0.1), pytest.approx(25, rel=0.1))
+    assert found.shake_px == 0
+    late = 0.01 * np.sign(np.sin(3 * T))  # a clock is no localiser: where the bob is slow it does not show
+    found = factors(quick[0] + VX * late, quick[1] + VY * late, unsteady=0.03)
+    assert (found.x, found.y) == (pytest.approx(1.5, rel=0.3), pytest.approx(1.5, rel=0.3))
+
+
+def test_quick_scatter_sees_through_a_shake_at_uneven_times():
+    rng = np.random.default_rng(4)
+    t = np.sort(rng.uniform(0, 4, 240))
+    t = t[np.diff(t, prepend=-1.0) > 0.004]
+    sigma = rng.uniform(0.02, 0.04, t.size)
+    shaken = 3 * np.sin(2 * np.pi * 0.7 * t) + rng.normal(0, 1.0, t.size) * sigma
+    assert quick_scatter(t, shaken, sigma) == pytest.approx(1.0, rel=0.15)
 
 
 def test_a_clock_that_errs_or_a_drive_is_no_shake():

@@ -44,16 +44,19 @@ def fit_jointly(
     vx, vy = swing.velocity(t)
     late_x, late_y = (np.hypot(v * time_sigma_s, shake.sigma) for v in (vx, vy))
 
+    unsteady = min(shake.unseen_px, np.inf if lines is None else lines.apart_px)
+
     def factors(x: np.ndarray, y: np.ndarray, rough: bool = False) -> Factors:
-        rx, ry = places.x_px - x, places.y_px - y
-        own = (places.sigma_x_px[good], places.sigma_y_px[good]), (vx[good], vy[good])
-        found = true_sigma((rx[good], ry[good]), *own, shake.sigma[good], time_sigma_s, rough)
+        rx, ry = (places.x_px - x)[good], (places.y_px - y)[good]
+        sx, sy = places.sigma_x_px[good], places.sigma_y_px[good]
+        velocity = vx[good], vy[good]
+        found = true_sigma(t[good], (rx, ry), (sx, sy), velocity, shake.sigma[good], time_sigma_s, unsteady, rough)
         if not shake.taken:
             return found
-        # the picture's own places hold the shake, but not the error with which it was measured
-        shaken = (rx + shake.x)[good], (ry + shake.y)[good]
-        plain = true_sigma(shaken, *own, 0 * shake.sigma[good], time_sigma_s)
-        return Factors(min(found.x, plain.x), min(found.y, plain.y), found.shake_px)
+        # the picture's own places hold the shake, which is smooth, but not the error with which it was measured
+        picture = rx + shake.x[good], ry + shake.y[good]
+        own = true_sigma(t[good], picture, (sx, sy), velocity, 0 * shake.sigma[good], time_sigma_s, rough=True)
+        return found._replace(x=own.x, y=own.y)
 
     start = np.array(swing.values_at(t[good][0], camera.fps_factor))
     when = t / camera.fps_factor

@@ -8,9 +8,13 @@ import numpy as np
 
 _FITS = 2.5  # a motion fits where places stray from it by less than so many times their scatter from frame to frame
 _CLOCK = 3.0  # by how much a localiser may be worse along the motion than across it
-_MOST = 3.0  # what a fit's own σ may be wrong by in a bad clip
-_WORST = 10.0  # beyond this it is not the localiser's
+_SLOW = 0.35  # of the greatest speed: below it a clock that errs hardly moves the bob
 _FREE = 9  # what a fitted motion has taken from the residuals of each axis
+_LEAST, _USUAL, _MOST = (
+    0.5,
+    4.0,
+    10.0,
+)  # what a fit's own σ is multiplied by; beyond the last what is quick is not its own
 
 
 class Factors(NamedTuple):
@@ -22,46 +26,58 @@ class Factors(NamedTuple):
 
 
 def true_sigma(
+    t_s: np.ndarray,
     residuals: tuple[np.ndarray, np.ndarray],
     sigmas: tuple[np.ndarray, np.ndarray],
     velocity: tuple[np.ndarray, np.ndarray],
     shake_px: np.ndarray,
     time_sigma_s: float,
+    unsteady_px: float = np.inf,
     rough: bool = False,
 ) -> Factors:
-    """Make the fit's σ agree with the residuals about a motion, all (n,) for x and y over the measured frames, less what the
-    shake and the clock are known to add.
+    """Make the fit's σ agree with the residuals about a motion, all (n,) for x and y over the measured frames at t_s, less
+    what the shake and the clock are known to add. `unsteady_px` is the most that the camera can have moved.
 
-    Where the motion fits, its residuals are the localiser's errors, slow ones too (a codec's, a shadow's). Where it does
-    not, what changes from frame to frame is the localiser's; the rest is a camera's shake as far as it is across the
-    motion, where no pendulum moves and no clock errs. About a `rough` motion, or where a shake was taken away, only what
-    changes from frame to frame tells of the localiser.
+    Where the motion fits, or the camera is known to have stood still and no clock errs, its residuals are the localiser's
+    errors, slow ones too (a codec's, a shadow's, a pattern's). Where it does not, what changes from frame to frame is the
+    localiser's; the rest is a camera's shake as far as it is across the motion, where no pendulum moves and no clock errs.
+    About a `rough` motion, or where a shake was taken away, only what changes from frame to frame tells of the localiser.
     """
     (rx, ry), (sx, sy), (vx, vy) = residuals, sigmas, velocity
     speed = np.hypot(vx, vy) + 1e-9
     ux, uy = vx / speed, vy / speed
     across = rx * uy - ry * ux, np.hypot(sx * uy, sy * ux)
+    along = rx * ux + ry * uy, np.hypot(sx * ux, sy * uy)
+    still = unsteady_px < 0.5 * float(np.sqrt(np.mean(rx**2 + ry**2)))
+    # where the bob is slow a clock errs little: what is as large there as anywhere is the localiser's
+    slow, square = speed < _SLOW * speed.max(), _tamed(along[0] / along[1]) ** 2
+    timely = slow.sum() > 20 and np.mean(square[slow]) > 0.5 * np.mean(square)
     clock = vx * time_sigma_s, vy * time_sigma_s, np.zeros_like(speed)
     found, fits = [], []
     for (r, s), late in zip(((rx, sx), (ry, sy), across), clock):
         known = float(np.mean((np.hypot(late, shake_px) / s) ** 2))
         r = _tamed(r / s) * s  # a few pictures may be of another time
-        square = scatter(r / s) ** 2
-        near = square - known if square - known > 0.3 * square else np.nan
+        quick = _less(quick_scatter(t_s, r, s) ** 2, known)
         whole = float(np.mean((r / s) ** 2)) * r.size / max(r.size - _FREE, 1) - known
-        fits.append(whole <= _FITS**2 * near)
-        if rough or np.any(shake_px):
-            found.append(near)
+        fits.append(whole <= _FITS**2 * quick)
+        if rough or np.any(shake_px) or not (fits[-1] or (still and timely)):
+            found.append(quick if quick < _MOST**2 else np.nan)
         else:
-            found.append(max(near, whole) if fits[-1] else min(near, scatter(r / s, 7) ** 2))
-    own = found[2] if np.isfinite(found[2]) else 1.0
-    factors = [f if f <= _CLOCK**2 * own else own for f in found[:2]]  # the rest is the clock's
-    r, s = across
+            found.append(max(quick, whole))
+    own = found[2] if np.isfinite(found[2]) else _USUAL**2
+    if still and timely:
+        own = max(own, float(np.mean(square[slow])))
+    x, y = (f if f <= _CLOCK**2 * own else own for f in found[:2])  # the rest is the clock's
     left = 0.0
-    if not rough and not fits[2] and np.isfinite(found[2]):
-        left = float(np.sqrt(max(np.mean(r**2) - found[2] * np.mean(s**2) - np.mean(shake_px**2), 0.0)))
-    x, y = (max(float(np.sqrt(f)), 0.5) if f < _WORST**2 else _MOST for f in factors)
-    return Factors(x, y, left)
+    if not (rough or fits[2] or still):
+        r, s = across
+        left = float(np.sqrt(max(np.mean(r**2) - own * np.mean(s**2) - np.mean(shake_px**2), 0.0)))
+    return Factors(max(float(np.sqrt(x)), _LEAST), max(float(np.sqrt(y)), _LEAST), left)
+
+
+def _less(square: float, known: float) -> float:
+    """The square without what is known of it; NaN where that is nearly all, so that nothing can be told of the rest."""
+    return square - known if square - known > 0.3 * square else np.nan
 
 
 def _tamed(r: np.ndarray) -> np.ndarray:
@@ -70,11 +86,18 @@ def _tamed(r: np.ndarray) -> np.ndarray:
     return np.clip(r, np.median(r) - most, np.median(r) + most)
 
 
-def scatter(r: np.ndarray, width: int = 15) -> float:
-    """Standard deviation of a series (n,) about parabolas through `width` neighbours."""
-    if r.size < 2 * width:
-        return float(np.sqrt(np.mean(r**2)))
-    half = width // 2
-    kernel = np.linalg.pinv(np.vander(np.arange(-half, half + 1), 3, increasing=True))[0]
-    rest = r[half:-half] - np.convolve(r, kernel[::-1], "valid")
-    return float(np.sqrt(np.mean(rest**2) / (1 - kernel[half])))
+def quick_scatter(t_s: np.ndarray, r: np.ndarray, s: np.ndarray) -> float:
+    """Standard deviation of what changes from one to the next in a series (n,) at times t_s, over its own σ, about
+    polynomials through neighbours (by divided differences): of the lowest degree above which no more of it goes away."""
+    found = []
+    for degree in (2, 4, 6, 8):
+        if r.size < 4 * degree:
+            break
+        t, near_r, near_s = (np.lib.stride_tricks.sliding_window_view(a, degree + 1) for a in (t_s, r, s))
+        apart = (t[:, :, None] - t[:, None, :]) / np.ptp(t, axis=1)[:, None, None]
+        weight = 1 / np.prod(apart + np.eye(degree + 1), axis=2)
+        differences = np.sum(weight * near_r, axis=1) / np.sqrt(np.sum((weight * near_s) ** 2, axis=1))
+        found.append(float(np.sqrt(np.mean(differences**2))))
+    if not found:
+        return float(np.sqrt(np.mean((r / s) ** 2)))
+    return next(f for f in found if f < 1.2 * min(found))

@@ -8,12 +8,14 @@ from toolkit.sentence import said
 from toolkit.tracking.follow import Follower
 from toolkit.tracking.stillness import CameraShift
 
+_CHECKS = 4  # looks at the background that it takes to say that the camera stood still
+
 
 class Shake:
     """How far the camera's shake moved the bob's place on each frame, smoothed as far as its own noise asks for.
 
     raw_x, raw_y (n,) were taken away while following (0 where the camera seemed to stand still), x, y (n,) are to be, which leaves each
-    frame `sigma` (n,) px. `taken` is False where the camera stood still.
+    frame `sigma` (n,) px. `taken` is False where the camera stood still as far as could be seen; then it may have moved by `unseen_px`.
     """
 
     def __init__(self, follower: Follower, good: np.ndarray, log: list[str]) -> None:
@@ -22,6 +24,8 @@ class Shake:
         self.raw_x, self.raw_y, self.sigma = np.zeros(n), np.zeros(n), np.zeros(n)
         self.x, self.y = self.raw_x, self.raw_y
         self.taken = follower.shaking
+        checks = [np.hypot(s.x_px, s.y_px) + 3 * s.sigma_px for s in follower.checks.values()]
+        self.unseen_px = float(np.max(checks)) if len(checks) >= _CHECKS and not self.taken else np.inf
         row = {index: k for k, index in enumerate(r.index)}
         known: dict[int, CameraShift] = {row[i]: s for i, s in follower.checks.items() if i in row}
         known |= {k: s for k, s in enumerate(r.shift) if s is not None}

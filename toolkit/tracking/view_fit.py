@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolkit.tracking.least_squares import Minimum, least_squares
+from toolkit.tracking.pivot import line_pivot
 from toolkit.tracking.swing import NAMES as SWING_NAMES
 from toolkit.tracking.swing import solve_swing
 from toolkit.tracking.view import AT, GROUPS, NAMES, View
@@ -52,6 +53,12 @@ class Lines(NamedTuple):
     def of(self, chosen: np.ndarray) -> Lines:
         """Some of them, by index or mask."""
         return Lines(*(column[chosen] for column in self))
+
+    @property
+    def apart_px(self) -> float:
+        """By how much they miss the point in which they meet best (rms but for strays)."""
+        meet = line_pivot(self.x_px, self.y_px, self.angle_rad, np.ones(self.x_px.size))
+        return np.inf if meet is None else float(np.sqrt(meet.reduced_chi2))
 
     def seen(self) -> Lines | None:
         """Those that were measured; None where they are too few to tell a pivot."""
@@ -92,8 +99,8 @@ def fit_view(
         return None
     problem.trim(square.values)
     chosen = problem.solve(square.values, _SQUARE, 8) or square
-    full = problem.solve(chosen.values, NAMES, 8)
-    modes = [] if full is None else [full]
+    sides = problem.modes(chosen.values, *_turned(chosen.values), deep=np.inf)
+    modes = sides[:1]
     shown: tuple[str, ...] = ()
     while modes and len(shown) < len(GROUPS):
         problem.weigh(problem.inflation(modes[0].values))
@@ -114,7 +121,7 @@ def fit_view(
         shown = (*shown, winner)
         problem.trim(best.values)
         chosen = problem.solve(best.values, _names(shown), 12) or best
-    modes = problem.modes(*(m.values for m in modes[:1]), chosen.values, *_turned(chosen.values))
+    modes = problem.modes(*(m.values for m in (*modes, *sides[1:])))
     if not modes:
         return None
     try:
@@ -250,13 +257,13 @@ class _Problem:
             self.rest, values, self.steps, index, turns=turns, settled=1e-5, slopes=lambda v: self.slopes(v, index)
         )
 
-    def modes(self, *starts: np.ndarray) -> list[Minimum]:
-        """The minima with every effect free to which these starts lead, the deepest first."""
+    def modes(self, *starts: np.ndarray, deep: float = 30.0) -> list[Minimum]:
+        """The minima with every effect free to which these starts lead, the deepest first, up to `deep` above it in χ²."""
         found = [m for m in (self.solve(s, NAMES, 10) for s in starts) if m is not None]
         apart: list[Minimum] = []
         for mode in sorted(found, key=lambda m: m.chi2):
             near = any((mode.values - m.values) @ m.normal @ (mode.values - m.values) < 4.0 for m in apart)
-            if not apart or (not near and mode.chi2 < apart[0].chi2 + 30):
+            if not apart or (not near and mode.chi2 < apart[0].chi2 + deep):
                 apart.append(mode)
         return apart
 
