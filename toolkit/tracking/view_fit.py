@@ -198,8 +198,12 @@ class _Problem:
     def rest(self, v: np.ndarray) -> np.ndarray:
         """Positions (x then y), lines, priors, over their standard uncertainties: (…, r) for v (19,) or (19, k, 1)."""
         stacked = v.reshape(len(NAMES), -1)
-        angle = np.array([solve_swing(s, self.t + s[16] * self.rows)[0] for s in stacked.T])
+        angle = self._angles(stacked.T)
         return self._rest(v, angle[0] if v.ndim == 1 else angle)
+
+    def _angles(self, motions: np.ndarray) -> np.ndarray:
+        """The angle of each of the motions (k, 19) at each position, (k, n)."""
+        return solve_swing(motions, self.t + motions[:, 16:17] * self.rows)[:, 0]
 
     def _rest(self, v: np.ndarray, angle: np.ndarray) -> np.ndarray:
         sway = self.model.sway(v, self.t + v[16] * self.rows)
@@ -219,10 +223,8 @@ class _Problem:
         angle = solve_swing(v, self.t + v[16] * self.rows)[0]
         moved = v0 + np.eye(len(NAMES))[:, index][..., None] * self.steps[:, None, None]
         angles = np.tile(angle, (len(index), 1))
-        for row, i in enumerate(index):
-            if 4 <= i <= 8 or i == 16:
-                w = moved[:, row, 0]
-                angles[row] = solve_swing(w, self.t + w[16] * self.rows)[0]
+        moving = [row for row, i in enumerate(index) if 4 <= i <= 8 or i == 16]
+        angles[moving] = self._angles(moved[:, moving, 0].T)
         return ((self._rest(moved, angles) - self._rest(v, angle)) / self.steps[index][:, None]).T
 
     def line_rest(self, v: np.ndarray) -> np.ndarray:
