@@ -199,3 +199,73 @@ def test_the_outline_is_found_whatever_is_painted_on_the_bob(name):
             found.append((place.x_px - 300 - x, place.y_px - 500 - y))
     rms = {tracker: np.sqrt(np.mean(np.square(found))) for tracker, found in errors.items()}
     assert rms["edge"] < min(allowed, 0.6 * rms["colour_moments"])
+
+
+def turned(phase):
+    """Three dark and three bright stripes round a ball, turned about its upright axis."""
+
+    def paint(u, v):
+        longitude = np.arctan2(u, np.sqrt(np.maximum(1 - u * u - v * v, 1e-6)))
+        return np.where(np.sin(3 * longitude + phase) > 0, 40.0, 110.0)
+
+    return paint
+
+
+def test_a_striped_ball_that_turns_does_not_draw_the_outline_with_it():
+    """A stripe that comes or goes at the rim is foreshortened to less than a pixel; σ must allow for what it does."""
+    rng = np.random.default_rng(9)
+    look, errors, pulls = Look(RADIUS, 0.8, -100.0, NOISE, even=False), [], []
+    for phase in np.arange(16) * np.pi / 8:
+        x, y = 28 + rng.uniform(-1, 1, 2)
+        image = painted(x, y, turned(phase)) + rng.normal(0, NOISE, (56, 56)).astype(np.float32)
+        place = load_tracker("edge").locate(patch_of(image), look, Guess(300.4 + x, 499.7 + y))
+        errors.append((place.x_px - 300 - x, place.y_px - 500 - y))
+        pulls.append((errors[-1][0] / place.sigma_x_px, errors[-1][1] / place.sigma_y_px))
+    assert np.sqrt(np.mean(np.square(errors), axis=0)) == pytest.approx((0, 0), abs=0.08)
+    assert np.sqrt(np.mean(np.square(pulls))) < 2.5
+
+
+def test_a_striped_bob_of_a_rendered_film_is_found_on_every_phase():
+    """Exact truth of the renderer, whose stripes are as sharp as its pixels; the centroid is off by a pixel."""
+    from toolkit import Scene
+    from toolkit.render import stage
+
+    scene = Scene.from_dict(
+        {
+            "pendulum": {"mass_kg": 0.1, "length_m": 0.5, "bob_radius_m": 0.1},
+            "release": {"theta0_rad": 0.3},
+            "camera": {
+                "width_px": 160, "height_px": 120, "fps": 10, "duration_s": 1.5, "px_per_m": 150, "pivot_px": [80.3, 20.4], "seed": 4,
+                "wall": {"colour_rgb": [200, 200, 200]}, "sensor_noise": {"read_sigma": 2.0}, "string": {"width_px": 0},
+                "bob_look": {"look": "rotating_pattern", "colour_rgb": [60, 60, 60], "second_rgb": [235, 235, 235],
+                             "strength": 0.5, "spin_rad_per_s": 1.5},
+            },
+        }
+    )  # fmt: skip
+    film = stage(scene)
+    errors = []
+    for k, frame in enumerate(film.frames()):
+        x, y = film.truth.x_px[k], film.truth.y_px[k]
+        image = frame[:, :, 1].astype(np.float32)
+        patch = Patch(image, np.full_like(image, 200.0), np.full_like(image, 40.0), 0.0, 0.0)
+        look = Look(float(film.truth.radius_px[k]), 0.58, -100.0, NOISE, even=False)
+        place = load_tracker("edge").locate(patch, look, Guess(x + 0.4, y - 0.3))
+        errors.append((place.x_px - x, place.y_px - y))
+    assert len(errors) == 15
+    assert np.sqrt(np.mean(np.square(errors), axis=0)) == pytest.approx((0, 0), abs=0.12)
+
+
+@pytest.mark.parametrize("name", tracker_names())
+def test_the_misfit_tells_what_the_localisers_idea_of_the_bob_leaves(name):
+    """On a plain disc hardly more than the noise; on a bob in halves, the halves, but for the outline fit."""
+    rng = np.random.default_rng(10)
+    noise = rng.normal(0, NOISE, (56, 56)).astype(np.float32)
+    look = Look(RADIUS, 0.8, -100.0, NOISE)
+    place = load_tracker(name).locate(patch_of(blurred_disc(28.3, 27.8, 0.8) + noise), look, Guess(328, 528))
+    assert 0.3 * NOISE < place.misfit < 3.5 * NOISE
+    halves = painted(28.3, 27.8, PAINTS["halves"][0]) + noise
+    place = load_tracker(name).locate(patch_of(halves), look._replace(even=False), Guess(328, 528))
+    if name == "edge":
+        assert place.misfit < 2 * NOISE
+    else:
+        assert not place.misfit < 3 * NOISE  # or nothing was found

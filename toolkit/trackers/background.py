@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.trackers.colour_moments import _noise
-from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
+from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place, unexplained
 
 
 def locate(patch: Patch, look: Look, guess: Guess) -> Place:
@@ -33,7 +33,8 @@ def locate(patch: Patch, look: Look, guess: Guess) -> Place:
     sigma = 0.4 / np.sqrt(look.radius_px) + 0.05  # pixels at the rim fall on either side by chance
     visible = min(1.0, area / (np.pi * look.radius_px**2))
     mx, my = (float(v) for v in middles[best])
-    return Place(mx + patch.x_px, my + patch.y_px, sigma, sigma, noise, visible, contrast)
+    misfit = unexplained(patch, look, guess, mx, my)
+    return Place(mx + patch.x_px, my + patch.y_px, sigma, sigma, misfit, visible, contrast)
 
 
 LOCALISER = Localiser("background", "middle of the pixels that differ from the wall", locate)

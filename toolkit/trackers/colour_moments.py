@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
+from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place, unexplained
 
 
 def locate(patch: Patch, look: Look, guess: Guess) -> Place:
@@ -32,9 +32,8 @@ def locate(patch: Patch, look: Look, guess: Guess) -> Place:
     sigma_y = noise * float(np.sqrt(((rows - y) ** 2 * edge).sum())) / total
     visible = min(1.0, total / (np.pi * look.radius_px**2))
     contrast = float(np.median((patch.image - patch.back)[weight > 0.5])) if (weight > 0.5).any() else 0.0
-    return Place(
-        x + patch.x_px, y + patch.y_px, sigma_x + 1e-4, sigma_y + 1e-4, noise * abs(look.contrast), visible, contrast
-    )
+    misfit = unexplained(patch, look, guess, x, y)
+    return Place(x + patch.x_px, y + patch.y_px, sigma_x + 1e-4, sigma_y + 1e-4, misfit, visible, contrast)
 
 
 def _noise(patch: Patch, near: np.ndarray) -> float:

@@ -54,8 +54,9 @@ class Guess(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where the bob was found. `misfit` is the rms of the fit in grey levels, `visible` the fraction of the outline
-    that was seen, `contrast` bob minus wall, `wall` the level of the wall if it was measured. A localiser that finds nothing returns NaN for x and y."""
+    """Where the bob was found. `misfit` is what the localiser's idea of the bob leaves unexplained of the picture (rms, grey
+    levels): by it the pipeline chooses between localisers. `visible` is the fraction of the outline that was seen, `contrast`
+    bob minus wall, `wall` the level of the wall if it was measured. A localiser that finds nothing returns NaN for x and y."""
 
     x_px: float
     y_px: float
@@ -65,6 +66,29 @@ class Place(NamedTuple):
     visible: float
     contrast: float
     wall: float = np.nan
+
+
+def disc_share(distance: np.ndarray, look: Look) -> np.ndarray:
+    """How much a disc at rest covers of a pixel so far from its centre (px): its edge is the integral of a compact kernel
+    that is very near to a normal distribution."""
+    v = np.clip((look.radius_px - distance) / (2.6458 * look.edge_px), -1, 1)
+    return np.asarray(0.5 + 0.9375 * v * (1 - v * v * (2 / 3 - 0.2 * v * v)))
+
+
+def unexplained(patch: Patch, look: Look, guess: Guess, x: float, y: float) -> float:
+    """What an even disc at (x, y) of the patch, smeared along its way, leaves of the picture on it and about it (rms, grey
+    levels): the misfit of a localiser that takes the bob for one shade but fits no model."""
+    rows, columns = np.ogrid[: patch.image.shape[0], : patch.image.shape[1]]
+    streak = np.hypot(guess.streak_x_px, guess.streak_y_px)
+    parts = np.linspace(-0.5, 0.5, 1 + int(np.ceil(streak)))
+    ways = [
+        np.hypot(columns - x - u * guess.streak_x_px, rows - y - u * guess.streak_y_px) for u in parts * (streak > 0)
+    ]
+    near = np.min(ways, axis=0) < look.radius_px + 3 * look.edge_px
+    share = np.mean([disc_share(d[near], look) for d in ways], axis=0)
+    picture = (patch.image - patch.back)[near]
+    rest = picture - share * (picture @ share) / max(float(share @ share), 1e-9)
+    return float(np.sqrt(np.mean(rest**2)))
 
 
 NOWHERE = Place(np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
+from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place, disc_share
 
 
 def locate(patch: Patch, look: Look, guess: Guess) -> Place:
@@ -54,9 +54,7 @@ def drawn(look: Look, wall: float) -> np.ndarray:
     """A template (k, k) float32, k odd, of a plain disc of the look's radius, edge and contrast on a level wall."""
     half = int(np.ceil(look.radius_px + 3 * look.edge_px + 1))
     rows, columns = np.mgrid[-half : half + 1, -half : half + 1]
-    v = np.clip((look.radius_px - np.hypot(rows, columns)) / (2.6458 * look.edge_px), -1, 1)
-    share = 0.5 + 0.9375 * v * (1 - v * v * (2 / 3 - 0.2 * v * v))
-    return (wall + (look.contrast or -100.0) * share).astype(np.float32)
+    return (wall + (look.contrast or -100.0) * disc_share(np.hypot(rows, columns), look)).astype(np.float32)
 
 
 LOCALISER = Localiser("template", "least-squares shift of the bob's mean picture", locate)
