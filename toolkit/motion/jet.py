@@ -27,7 +27,7 @@ def _function(name: str, first: Sequence[str], each: Sequence[str], ends: Sequen
 class Jet:
     """Writes jet(q, s, W, R, n): Taylor coefficients 0 … n of θ and w, 0 … n − 1 of F and of the functions in F, F_θ, F_w, F_τ.
 
-    And more(q, s, W, R, n), to be called after it: those of the functions that only the sensitivities need.
+    s holds τ, θ, w, its sign, and what rounding took from θ. And more(q, s, W, R, n), to be called after it: those of the functions that only the sensitivities need.
     """
 
     def __init__(self, writer: Any):
@@ -245,6 +245,9 @@ class Jet:
                 f"W[{cosine * ROW} + k] = -v * R[k]",
             ]
         self.first += [f"W[{sine * ROW}] = math.sin(v)", f"W[{cosine * ROW}] = math.cos(v)"]
+        if angle == self.state["theta"]:  # what rounding took from θ counts after many turns
+            self.first += [f"u, v = s[4] * W[{cosine * ROW}], s[4] * W[{sine * ROW}]"]
+            self.first += [f"W[{sine * ROW}] += u", f"W[{cosine * ROW}] -= v"]
         return row
 
     def _exponential(self, expression: Any) -> int:

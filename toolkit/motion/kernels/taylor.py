@@ -177,7 +177,7 @@ def taylor(places: Any) -> None:
     tolerance = numbers[4]
     per_second = numbers[5]
     s = work  # the present time, θ, w and its sign
-    lost = skip(work, 4)  # what the last sums of θ and w lost
+    lost = skip(work, 4)  # what the last sums of θ and w lost; the first is the fifth number of s
     x = skip(lost, 2)
     F = skip(x, SPARE)
     J = skip(F, ROW)
