@@ -2,7 +2,7 @@
 
     python benchmarks/integrators.py                 all of the below, into benchmarks/results/integrators
     python benchmarks/integrators.py cost [--quick]  work and precision beside SciPy (the same as `pendulab cost integrators`)
-    python benchmarks/integrators.py accuracy [--count 200] [--seed 7]
+    python benchmarks/integrators.py accuracy [--count 200] [--seed 7] [--stiff]
                                                      random scenes: accuracy asked for, 1e-3 … 1e-11, against accuracy reached
     python benchmarks/integrators.py sensitivities   derivatives against differences of whole-number solutions
     python benchmarks/integrators.py samples         20 000 samples against 1000
@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from toolkit.cost._reference import ExactPendulum, solve_to_many_digits
 from toolkit.cost.integrators import measure
-from toolkit.cost.problems import Problem, problems, random_problem, true_angles
+from toolkit.cost.problems import Problem, problems, random_problem, random_stiff_problem, true_angles
 from toolkit.simulate import scene_equation, scene_parameters, simulate
 
 ASKED = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -40,6 +40,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="shorter problems and fewer tolerances")
     parser.add_argument("--count", type=int, default=200, help="random scenes")
     parser.add_argument("--seed", type=int, default=7, help="of the random scenes")
+    parser.add_argument("--stiff", action="store_true", help="random scenes that are overdamped 20 to 500 times")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "integrators")
     chosen = parser.parse_args()
     if chosen.what in ("all", "cost"):
@@ -58,7 +59,7 @@ def report_accuracy(chosen: argparse.Namespace) -> None:
     over: dict[float, list[float]] = {a: [] for a in ASKED}
     missed, warned = [], 0
     for i in range(chosen.count):
-        problem = random_problem(chosen.seed, i)
+        problem = (random_stiff_problem if chosen.stiff else random_problem)(chosen.seed, i)
         judged, truth = true_angles(problem, 100)
         runs = []
         for asked in (1e-2, *ASKED):

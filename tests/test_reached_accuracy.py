@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from toolkit.cost.problems import Problem, random_problem, true_angles
+from toolkit.cost.problems import Problem, random_problem, random_stiff_problem, true_angles
 from toolkit.scene import Environment, Pendulum, Release, Scene
 from toolkit.simulate import simulate
 
@@ -28,6 +28,16 @@ def test_accuracy_asked_for_is_reached_or_said_to_be_out_of_reach(first):
             if error > asked and not warned:
                 missed.append(f"scene {number}, {asked:g}: {error:.2g} ({trajectory.method}; {problem.what})")
     assert not missed, "\n".join(missed)
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_strong_drag_of_any_strength_is_reached(number):
+    problem = random_stiff_problem(SEED, number)
+    judged, truth = true_angles(problem, 60)
+    for asked in (1e-4, 1e-7, 1e-10):
+        trajectory = simulate(problem.scene, problem.t_s, asked)
+        assert "Rodas" in trajectory.method, problem.name
+        assert np.max(np.abs(trajectory.theta_rad[judged] - truth)) < asked, (problem.name, asked)
 
 
 @pytest.mark.parametrize("push", [0.0, 8.0, -3.0])

@@ -129,7 +129,9 @@ def draw(measured: Measured, stem: Path) -> None:
 
     figure = Figure(figsize=(11, 6), layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, problem in zip(figure.subplots(2, 4).flat, measured.problems):
+    columns = 4
+    panels = figure.subplots(2, columns).flat
+    for i, (axes, problem) in enumerate(zip(panels, measured.problems)):
         for method, (colour, marker, dash) in _STYLES.items():
             points = [
                 (max(r.error_rad, 1e-16), r.cpu_ms)
@@ -144,8 +146,10 @@ def draw(measured: Measured, stem: Path) -> None:
         axes.set_title(f"{problem.name}: {problem.what}", fontsize=8, loc="left")
         axes.tick_params(labelsize=7)
         axes.grid(alpha=0.25, linewidth=0.4)
-        axes.set_xlabel("largest error of θ (rad)", fontsize=7)
-        axes.set_ylabel("CPU (ms)", fontsize=7)
+        if i >= columns:
+            axes.set_xlabel("largest error of θ (rad)", fontsize=7)
+        if i % columns == 0:
+            axes.set_ylabel("CPU (ms)", fontsize=7)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=7, fontsize=8, frameon=False)
     figure.savefig(stem.with_suffix(".png"), dpi=200)

@@ -84,6 +84,21 @@ def random_problem(seed: int, number: int) -> Problem:
     return Problem(f"random {seed}/{number}", ", ".join(effects) or "bare", scene, duration, samples, duration)
 
 
+def random_stiff_problem(seed: int, number: int) -> Problem:
+    """A random scene, overdamped 20 to 500 times, at rest or pushed, with and without a drive: for the stiff route."""
+    random = np.random.default_rng([seed, number, 1])
+    mass, length, g = 10 ** random.uniform(-2, 0), 10 ** random.uniform(-1, 0.5), random.uniform(1, 20)
+    rate, strength = math.sqrt(g / length), 10 ** random.uniform(1.3, 2.7)
+    effects = {"linear_drag": {"k_d_kg_per_s": 2 * mass * rate * strength}}
+    if random.random() < 0.5:
+        f0, f = mass * g * 10 ** random.uniform(-2, 0.5), rate / (2 * math.pi) * 10 ** random.uniform(-1, 0.5)
+        effects["cosine_drive"] = {"f0_n": f0, "f_hz": f, "phase_rad": 0.0}
+    start, push = random.uniform(-3.1, 3.1), 0.0 if random.random() < 0.5 else 5 * rate * random.normal()
+    scene = Scene(Pendulum(mass, length), Release(start, push), Environment(g_m_per_s2=g), effects)
+    duration, samples = random.uniform(4000, 8000) / (2 * strength * rate), int(random.integers(5, 300))
+    return Problem(f"stiff {seed}/{number}", ", ".join(effects), scene, duration, samples, duration, stiff=True)
+
+
 def exact_coefficients(scene: Scene) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
     """2α, β, g/ℓ, f₀/(mℓ), f of the scene's own floats, as ratios of whole numbers."""
     p, e = scene.pendulum, scene.effects

@@ -48,12 +48,13 @@ def solve_pendulum(
 ) -> PendulumSolution:
     """Solve θ̈ = −ω_g² sin θ from θ(0), θ̇(0) at the times t_s (n,) in s, any sign.
 
-    compiled : many samples of few periods are read off one period's series by machine code; t_s must increase.
+    compiled : many samples of few periods are read off one period's series by machine code; t_s must be finite
+    and increase.
     θ is continuous: it grows past π when the pendulum goes over the top. Raises UsageError where ω_g ≤ 0 or a number is
     not finite.
     """
     t = np.asarray(t_s, dtype=float)
-    if t.ndim != 1 or not np.all(np.isfinite(t)):
+    if t.ndim != 1 or not (compiled or np.all(np.isfinite(t))):
         raise UsageError("t_s must be one column of finite times")
     motion = _classify(theta0_rad, omega0_rad_per_s, omega_g_rad_per_s)
     turns, theta0 = motion.turns, motion.theta0
