@@ -7,6 +7,7 @@ import pytest
 
 from toolkit.tracking.scatter import quick_scatter, true_sigma
 from toolkit.tracking.string_line import measure_string, seen_half
+from toolkit.tracking.verdict import poor_picture
 
 N = 400
 T = np.arange(N) / 60
@@ -82,3 +83,12 @@ def test_a_string_is_found_though_the_pivot_is_not_known_well(wrong_px):
     assert line.angle_rad == pytest.approx(truth, abs=5 * line.sigma_angle_rad + 2e-4)
     half = seen_half(np.hypot(line.x_px - bob[0], line.y_px - bob[1]), radius)
     assert half == pytest.approx(0.5 * (np.hypot(280.0, 50.0) - 1.15 * radius - 10.0), abs=12.0)
+
+
+def test_a_bob_with_a_pattern_is_warned_of_only_where_its_places_stray():
+    followed_well = poor_picture(0.03, False, 0.2, 0.05)
+    assert followed_well == []
+    (strays,) = poor_picture(0.03, False, 0.2, 0.6)
+    assert strays.values["off_px"] == 0.6
+    (shadowed,) = poor_picture(0.2, True, 1.0, 0.05)
+    assert shadowed.values["off_px"] == 1.0

@@ -9,7 +9,7 @@ from toolkit.calibrate import calibrate
 from toolkit.render import stage
 from toolkit.scene import Scene
 from toolkit.track import Track
-from toolkit.tracking.clock import out_of_time, place_lost_frames
+from toolkit.tracking.clock import lone_strays, out_of_time, place_lost_frames
 from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.tracking.view_fit import Lines, fit_view
@@ -221,3 +221,21 @@ def test_a_repeated_picture_near_a_turning_point_is_left_out():
     left_out = out_of_time(placed(t, x, y), swing, [], [])
     assert set(slow) <= set(np.flatnonzero(left_out).tolist())
     assert left_out.sum() <= len(slow) + 2
+
+
+def test_single_frames_far_from_those_about_them_are_left_out_and_a_slow_error_is_not():
+    t = np.arange(300) / 60
+    rng = np.random.default_rng(9)
+    angle = 0.4 * np.cos(4.1 * t)
+    x, y = 320 + 400 * np.sin(angle), 20 + 400 * np.cos(angle)
+    x, y = (p + rng.normal(0, 0.03, t.size) + 0.5 * np.sin(2.3 * t) for p in (x, y))
+    swing = fit_swing(t, x, y, np.full(t.size, 0.1), start_swing(t, x, y))
+    assert swing is not None
+    assert not lone_strays(placed(t, x, y), swing, []).any()
+    astray = [40, 41, 150, 222]
+    x[astray] += 0.8
+    log: list[str] = []
+    assert np.flatnonzero(lone_strays(placed(t, x, y), swing, log)).tolist() == astray
+    assert [sentence.key for sentence in log] == ["track.lone_strays"]
+    x[::5] += 0.8  # so many: something else is amiss
+    assert not lone_strays(placed(t, x, y), swing, []).any()

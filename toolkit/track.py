@@ -16,7 +16,7 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
-from toolkit.tracking.clock import even_times, out_of_time, place_lost_frames, slips_told
+from toolkit.tracking.clock import even_times, lone_strays, out_of_time, place_lost_frames, slips_told
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.joint import Camera, fit_jointly
 from toolkit.tracking.places import Places
@@ -215,9 +215,10 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
 
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
     swing = whole_swing(followed, places, video.path)
-    require_pendulum(swing, places, video.path)
     places, swing = place_lost_frames(places, swing, warnings)
+    require_pendulum(swing, places, video.path)
     places = places.without(out_of_time(places, swing, log, warnings))
+    places = places.without(lone_strays(places, swing, log))
 
     good = places.good
     misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
@@ -235,9 +236,10 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     late = time_sigma * np.hypot(*swing.velocity(places.t_s))
     typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + shake.sigma**2)[good])))
     motion = swing if joint.view is None else joint.view.swing(fps_factor)
-    warnings += slips_told(places, swing, joint.x_px, joint.y_px)
-    warnings += poor_motion(motion, places.t_s, good, rms_px, typical)
-    warnings += poor_picture(misfit, look.even, off_px)
+    if not joint.factors.shake_px:  # a shaking camera leaps too
+        warnings += slips_told(places, swing, joint.x_px, joint.y_px)
+    warnings += poor_motion(motion, places.t_s, good, rms_px, typical, look.radius_px)
+    warnings += poor_picture(misfit, look.even, off_px, rms_px)
     for odd in clock_warnings(stamps, video):  # what the stamps account for affects no result
         (log if getattr(odd, "key", "") in _HARMLESS else warnings).append(odd)
 

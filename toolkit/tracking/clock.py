@@ -12,6 +12,8 @@ from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Video
 
 _LEFT_OUT = 0.12  # so many frames at another time than their stamp, left out, leave a clock that is sound else
+_STRAY = 8.0  # of its neighbours' robust standard deviation: so far a single frame is not measured right
+_LEAST_PX = 0.1  # and no less than this
 _PLACED = 0.01  # of the swing's extent: how far places may still stray where lost frames are placed
 
 
@@ -133,6 +135,28 @@ def place_lost_frames(places: Places, swing: Swing, warnings: list[str]) -> tupl
         )
     )
     return now, motion
+
+
+def lone_strays(places: Places, swing: Swing, log: list[str]) -> np.ndarray:
+    """Frames (n,) bool on which the bob was found far from where the motion and the frames about it have it: a picture shown
+    again, a post or a passer-by taken for it. None where they are so many that something else is amiss."""
+    off = []
+    for p, m in zip((places.x_px, places.y_px), swing.position(places.t_s)):
+        r = p - m - _running_median(p - m, places.good)
+        off.append(np.abs(r) / (1.4826 * np.median(np.abs(r[places.good])) + _LEAST_PX / _STRAY))
+    stray = places.good & (np.hypot(*off) > _STRAY)
+    if not 0 < stray.sum() < _LEFT_OUT * stray.size:
+        return np.zeros(stray.size, bool)
+    log.append(
+        said(
+            "track.lone_strays",
+            "{frames} frame(s) show the bob far from where the motion and the frames about them have it, first at t = {t_s:.3f} s; "
+            "they were left out",
+            frames=int(stray.sum()),
+            t_s=float(places.t_s[np.flatnonzero(stray)[0]]),
+        )
+    )
+    return stray
 
 
 def slips_told(places: Places, swing: Swing, x_px: np.ndarray, y_px: np.ndarray) -> list[str]:

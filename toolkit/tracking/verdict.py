@@ -13,6 +13,11 @@ from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing
 
 _POOR_PICTURE = 0.12  # of the contrast
+_STRAYS_PX, _STRAYS = (
+    0.1,
+    0.04,
+)  # the least that strays, and the share of the bob's radius that does, whatever its error bar
+_UNEVEN_PX = 0.15  # by so much the places of an uneven bob may stray, unmentioned
 
 
 def require_pendulum(swing: Swing, places: Places, path: Path) -> None:
@@ -60,7 +65,9 @@ def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:
     return now, float(np.sqrt(max(slope @ swing.covariance @ slope, 0.0)))
 
 
-def poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, rms_px: float, sigma_px: float) -> list[str]:
+def poor_motion(
+    swing: Swing, t: np.ndarray, good: np.ndarray, rms_px: float, sigma_px: float, radius_px: float
+) -> list[str]:
     """Sentences on a motion that was accepted, but is not quite that of a pendulum; `rms_px` is how far places stray from
     it as the camera saw it, `sigma_px` a place's error bar."""
     poor: list[str] = []
@@ -74,7 +81,7 @@ def poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, rms_px: float, si
                 share=float(np.expm1(growth)),
             )
         )
-    if rms_px > max(0.1, 3 * sigma_px):
+    if rms_px > max(_STRAYS_PX, min(3 * sigma_px, _STRAYS * radius_px)):
         poor.append(
             said(
                 "track.strays",
@@ -89,11 +96,13 @@ def poor_motion(swing: Swing, t: np.ndarray, good: np.ndarray, rms_px: float, si
     return poor
 
 
-def poor_picture(misfit: float, even: bool, off_px: float) -> list[str]:
+def poor_picture(misfit: float, even: bool, off_px: float, rms_px: float) -> list[str]:
     """A sentence on a bob that is no even disc: `misfit` is the share of its contrast that is not explained, `off_px` by how
-    much its centre may be off for that."""
-    if misfit <= _POOR_PICTURE and even:
+    much its centre may be off for that on all frames, `rms_px` by how much it strays. An uneven bob whose outline was
+    followed as well as another's is not mentioned."""
+    if misfit <= _POOR_PICTURE and (even or rms_px <= _UNEVEN_PX):
         return []
+    off_px = max(off_px, rms_px)
     return [
         said(
             "track.poor_picture",
