@@ -46,35 +46,46 @@ def _first(address: int, q: Any, s: Any, c: Any, n: int, now: float, h: float) -
     if here < 0.0:
         return 0.0
     for i in range(_PARTS + 1):
-        middle = part * i
-        ahead = _tension(address, q, c, n, now, middle + part, s)
-        low, high = max(middle - part, 0.0), min(middle + part, h)
-        below = middle + part if ahead < 0.0 and i < _PARTS else -1.0
-        if below < 0.0 and here <= last and here <= ahead and here < last - 2.0 * here + ahead:
+        x = part * i
+        ahead = _tension(address, q, c, n, now, x + part, s)
+        if ahead < 0.0 and i < _PARTS:
+            return _narrowed(address, q, s, c, n, now, x, x + part)
+        if here <= last and here <= ahead and here < last - 2.0 * here + ahead:
             # a minimum that a parabola through three looks would take below zero
-            left, right = low, high
-            while right - left > 1e-10 * h and below < 0.0:
-                first, second = left + 0.382 * (right - left), right - 0.382 * (right - left)
-                at_first = _tension(address, q, c, n, now, first, s)
-                at_second = _tension(address, q, c, n, now, second, s)
-                if at_first < 0.0:
-                    below = first
-                elif at_second < 0.0:
-                    below = second
-                if at_first < at_second:
-                    right = second
-                else:
-                    left = first
-        if below >= 0.0:
-            taut, slack = min(middle, below) if ahead < 0.0 and i < _PARTS else low, below
-            for _ in range(80):
-                half = 0.5 * (taut + slack)
-                if not taut < half < slack:
-                    break
-                if _tension(address, q, c, n, now, half, s) < 0.0:
-                    slack = half
-                else:
-                    taut = half
-            return slack
+            left, right = max(x - part, 0.0), min(x + part, h)
+            below = _below(address, q, s, c, n, now, left, right)
+            if below >= 0.0:
+                return _narrowed(address, q, s, c, n, now, left, below)
         last, here = here, ahead
     return -1.0
+
+
+@njit
+def _below(address: int, q: Any, s: Any, c: Any, n: int, now: float, left: float, right: float) -> float:
+    """A time near a minimum at which the tension is below zero, or −1, by golden sections."""
+    least = 1e-10 * (right - left)
+    while right - left > least:
+        first, second = left + 0.382 * (right - left), right - 0.382 * (right - left)
+        at_first, at_second = _tension(address, q, c, n, now, first, s), _tension(address, q, c, n, now, second, s)
+        if at_first < 0.0:
+            return first
+        if at_second < 0.0:
+            return second
+        if at_first < at_second:
+            right = second
+        else:
+            left = first
+    return -1.0
+
+
+@njit
+def _narrowed(address: int, q: Any, s: Any, c: Any, n: int, now: float, taut: float, slack: float) -> float:
+    for _ in range(80):
+        middle = 0.5 * (taut + slack)
+        if not taut < middle < slack:
+            break
+        if _tension(address, q, c, n, now, middle, s) < 0.0:
+            slack = middle
+        else:
+            taut = middle
+    return slack
