@@ -238,8 +238,8 @@ def _follow(
 
     def take(i: int, guess: Guess) -> bool:
         fit = by_silhouette(i, guess) if outlined else fit_at(i, look, guess)
-        if fit is not None and not outlined:
-            fit = fit_at(i, look, Guess(fit[0], fit[1]), free=True)
+        if not outlined:  # where a wide look does not settle (a highlight on a streaked bob) a close one may
+            fit = fit_at(i, look, guess if fit is None else Guess(fit[0], fit[1]), free=True)
         if fit is None or not 0.7 < fit[2].radius_px / look.radius_px < 1.4:
             return False
         if not 0.4 < fit[2].contrast / look.contrast < 2.0:

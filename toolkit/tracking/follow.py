@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field, replace
-from math import cos, hypot, isfinite, sin
+from math import cos, hypot, isfinite, isnan, nan, sin
 
 import numpy as np
 
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
 from toolkit.tracking.acquire import Rough
-from toolkit.tracking.learn import Known, light_on, restarted
+from toolkit.tracking.learn import Known, restarted
+from toolkit.tracking.looks import light_on
 from toolkit.tracking.search import find_round_near, silhouette
 from toolkit.tracking.stillness import CameraShift
 from toolkit.tracking.string_line import measure_string
@@ -55,11 +56,16 @@ class Follower(Known):
         self.hidden = 0
         self.astray = 0.0  # how far the bob was from the fitted motion lately, px
         self._fitted_at = 0
+        self._shade_seen = np.nan  # the bob's own brightness at the place judged last
         self._shade = np.nan  # the bob's own brightness lately, and how much it changes
         self._shade_scatter = 0.03 * abs(rough.look.contrast)
         self.first: list[Frame] = []  # the frames read ahead, if they are the first that will be followed
         self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
         self._print: np.ndarray | None = None
+        self._usually_unlike = np.nan  # how much of a bob with a pattern differs from what stands still
+        self._frame: Frame | None = None  # the one that is measured
+        self._speed = 0.0  # of the bob on it, px/s
+        self._lit: tuple[float, np.ndarray] = (np.nan, np.empty(0))  # the bob's brightness lately, and the picture's
 
     def follow(self, frame: Frame) -> None:
         """Measure one frame, in the order of the file."""
@@ -95,6 +101,7 @@ class Follower(Known):
     def _measure(self, frame: Frame, guess: Guess) -> tuple[Place, Patch | None]:
         """Where the bob is, looked for at the guess, then around it; and the patch that shows it, None where what was found is
         not believed."""
+        self._frame = frame
         patch = self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)
         if patch is None or not self._believe(patch, place, guess):
@@ -102,6 +109,9 @@ class Follower(Known):
             if found is None:
                 return place, None
             place, patch = found
+        again = self._beside_shadow(self.localiser, frame, guess, place)
+        if again is not None and self._believe(again[1], again[0], guess):
+            place, patch = again
         return place, patch if self._stands_out(patch, place) else None
 
     def _locate(self, patch: Patch, guess: Guess) -> Place:
@@ -109,7 +119,7 @@ class Follower(Known):
             return self._locate_uneven(patch, guess)
         if not self.hidden and len(self.recent) == 3:
             place = self.localiser.locate(patch, self.look_at(guess), guess)
-            if np.isfinite(place.x_px):
+            if isfinite(place.x_px):
                 return place
         look = self.look_at(guess)
         wide = fit_disc(patch, look._replace(noise=np.inf), guess, soften=2.5, turns=12)
@@ -122,7 +132,7 @@ class Follower(Known):
         localiser, if it agrees, how exactly."""
         look = self.look
         sure = self.localiser.locate(patch, look, guess)
-        if sure.visible >= self.ordinary_visible and 0.25 < sure.contrast / look.contrast < 4.0:
+        if sure.visible >= self._least_visible() and 0.25 < sure.contrast / look.contrast < 4.0:
             return sure
         found = self._outline_in(patch, 0.45)
         if found is None:
@@ -139,8 +149,8 @@ class Follower(Known):
         """Not where it should be: the bob's outline near there, the farther the longer it was not seen and the faster it is
         (a lost frame); now and then wherever it has been. None where no such outline is believed to be the bob."""
         look = self.look
-        way = self.interval_s * float(np.hypot(guess.streak_x_px, guess.streak_y_px)) / max(self.exposure_s, 1e-9)
-        reach = min(6.0, 1.0 + 0.5 * self.hidden) * look.radius_px + 4 + min(way, 6 * look.radius_px)
+        way = min(self.interval_s * self._speed, 6 * look.radius_px)
+        reach = min(6.0, 1.0 + 0.5 * self.hidden) * look.radius_px + 4 + way
         wide = self._patch(frame, look._replace(radius_px=look.radius_px + reach / 1.25), guess)
         found = None if wide is None else self._outline_in(wide)
         if found is None and self.hidden % _SEARCH_EVERY == _SEARCH_EVERY - 1:
@@ -155,7 +165,7 @@ class Follower(Known):
         other = self._locate(close, near)
         px, py = self.swing.pivot_px
         off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - self.swing.length_px)
-        alike = other.visible >= min(0.9, self.ordinary_visible + 0.05) and 0.6 < other.contrast / look.contrast < 1.6
+        alike = other.visible >= min(0.9, self._least_visible() + 0.05) and 0.6 < other.contrast / look.contrast < 1.6
         on_arc = off_arc < 0.5 * look.radius_px + 2 + 2 * self.swing.rms_px
         return (other, close) if alike and on_arc and self._believe(close, other, near) else None
 
@@ -182,57 +192,87 @@ class Follower(Known):
 
     def _light(self, patch: Patch, place: Place) -> float:
         """How bright the light on the bob is against that when the background was learned: by the wall beside it."""
-        if not np.isfinite(place.wall):
+        if not isfinite(place.wall):
             return 1.0
-        around = _back_at(patch, place, (self.look.radius_px + 2 * self.look.edge_px) * _ROUND)
+        around = _back_at(patch, place, self.look.radius_px + 2 * self.look.edge_px, _ROUND)
         level = float(around.mean()) if around.size else 0.0
-        return float(np.clip(place.wall / level, 0.3, 3.0)) if level > 1 else 1.0
+        return min(max(place.wall / level, 0.3), 3.0) if level > 1 else 1.0
 
-    def _shade_now(self, patch: Patch, place: Place) -> float:
+    def _shade_now(self, light: float, place: Place) -> float:
         """The bob's brightness in the light of when the background was learned: the wall beside it is darker or brighter now
-        because the light is, or because something else stands there; whichever leaves the bob as it was."""
+        because the light is, or because something else stands there; whichever leaves the bob as it was. In doubt the light
+        has changed since the bob was seen last as the whole picture has."""
         seen = place.contrast + place.wall
-        shades = (seen / self._light(patch, place), seen)
-        return shades[0] if np.isnan(self._shade) else min(shades, key=lambda s: abs(s - self._shade))
+        if isnan(self._shade):
+            return seen / light
+        shade = min((seen / light, seen), key=lambda s: abs(s - self._shade))
+        before, picture = self._lit
+        if abs(shade - self._shade) < 0.1 * abs(self.look.contrast) or isnan(before) or self._frame is None:
+            return shade
+        whole = float(np.median(_coarse(self._frame) / np.maximum(picture, 1.0)))
+        return min(shade, self._shade * seen / max(before * whole, 1.0), key=lambda s: abs(s - self._shade))
+
+    def _least_visible(self) -> float:
+        """How much of the outline must be seen of a bob as fast as it is now."""
+        return float(np.interp(self._speed, *self.ordinary_visible))
 
     def _believe(self, patch: Patch, place: Place, guess: Guess) -> bool:
         look = self.look
-        if not np.isfinite(place.x_px):
+        if not isfinite(place.x_px):
             return False
         ratio = place.contrast / look.contrast
         light = self._light(patch, place)
-        shade = abs(self._shade_now(patch, place) - self._shade)
-        if np.isnan(place.wall):  # a localiser for bobs with a pattern, which show now this side, now that
+        self._shade_seen = self._shade_now(light, place)
+        shade = abs(self._shade_seen - self._shade)
+        if isnan(place.wall) or not look.even:  # a bob with a pattern shows now this side, now that
             bright = 0.25 < ratio < 4.0
-        elif np.isnan(shade) or self.hidden > 15:
+        elif isnan(shade) or self.hidden > 15:
             bright = 0.5 < ratio / light < 2.0
         else:  # before something of another shade the contrast is another, but the bob is as bright as ever
-            bright = abs(ratio) > 0.3 and shade < 0.1 * abs(look.contrast) + 3 * self._shade_scatter
+            clear = abs(ratio) > 0.3 or abs(place.contrast) > 8 * place.misfit
+            bright = clear and shade < 0.1 * abs(look.contrast) + 3 * self._shade_scatter
         misfit = place.misfit / max(light, 1.0)
         return bool(
             bright
-            and place.visible >= self.ordinary_visible
+            and place.visible >= self._least_visible()
             and misfit < 2 * self.ordinary_misfit + 0.03 * abs(look.contrast)
-            and np.hypot(place.x_px - guess.x_px, place.y_px - guess.y_px) < 0.6 * look.radius_px + 2
+            and hypot(place.x_px - guess.x_px, place.y_px - guess.y_px) < 0.6 * look.radius_px + 2
         )
 
     def _stands_out(self, patch: Patch, place: Place) -> bool:
         """Does the bob differ from what is known to stand still where it is? Half behind a post of about its own brightness it
         seems whole: where nearly half of it could not be told from what is there without it, it is not believed."""
+        if not self.look.even:
+            return not self._unlike(patch, place) < 0.65 * self._usually_unlike
         shade = self._shade
-        if np.isnan(shade) or not np.isfinite(place.wall):
+        if isnan(shade) or not isfinite(place.wall):
             return True
-        behind = _back_at(patch, place, self.look.radius_px * _WITHIN)
+        still = patch._replace(back=self.back.mean, x_px=0.0, y_px=0.0)  # without the bob's own shadow
+        behind = _back_at(still, place, self.look.radius_px, _WITHIN)
         if behind.size < 8:
             return True
-        return bool(np.mean(np.abs(behind - shade) > 0.45 * abs(self.look.contrast)) > 0.6)
+        unlike = np.count_nonzero(np.abs(behind - shade) > 0.45 * abs(self.look.contrast))
+        return bool(unlike / behind.size > 0.6)
+
+    def _unlike(self, patch: Patch, place: Place) -> float:
+        """How much of a bob with a pattern differs from what stands still where it is."""
+        radius = self.look.radius_px
+        behind = _back_at(patch, place, radius, _WITHIN)
+        shown = _back_at(patch._replace(back=patch.image), place, radius, _WITHIN)
+        return float(np.mean(np.abs(shown - behind) > 0.2 * abs(self.look.contrast) + 4)) if behind.size else nan
 
     def _remember(self, frame: Frame, patch: Patch, place: Place) -> None:
         """What the next frames are judged by."""
         self.hidden = 0
         self.recent.append((frame.t_s, place.x_px, place.y_px))
-        shade = self._shade_now(patch, place)
-        if np.isnan(self._shade):
+        if not self.look.even:  # a bob with a pattern has no one brightness
+            share = self._unlike(patch, place)
+            self._usually_unlike = share if isnan(self._usually_unlike) else 0.9 * self._usually_unlike + 0.1 * share
+        if isnan(place.wall) or not self.look.even:
+            return
+        shade = self._shade_seen
+        self._lit = (place.contrast + place.wall, _coarse(frame))
+        if isnan(self._shade):
             self._shade = shade
         else:
             self._shade_scatter += 0.1 * (abs(shade - self._shade) - self._shade_scatter)
@@ -263,6 +303,7 @@ class Follower(Known):
     def _ahead(self, frame: Frame) -> Guess:
         """Where the bob should be on the frame, and its streak."""
         x, y, vx, vy = self._expect(frame.t_s)
+        self._speed = hypot(vx, vy)
         return self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
 
     def _expect(self, t: float) -> tuple[float, float, float, float]:
@@ -310,10 +351,10 @@ class Follower(Known):
         x0, y0 = round(patch.x_px), round(patch.y_px)
         if x0 < 0 or y0 < 0 or x0 + columns > self.shape[1] or y0 + rows > self.shape[0]:
             return
-        streak = 0.5 * float(np.hypot(guess.streak_x_px, guess.streak_y_px))
+        streak = 0.5 * hypot(guess.streak_x_px, guess.streak_y_px)
         keep_out = 1.05 * self.look.radius_px + 3 * self.look.edge_px + 1 + streak
         box = (x0, y0, x0 + columns, y0 + rows)
-        self.back.add(patch.image, box, (place.x_px, place.y_px, keep_out), self.pivot or self.swing.pivot_px)
+        self.back.add(patch.image, box, self._dark(place.x_px, place.y_px, keep_out), self.pivot or self.swing.pivot_px)
 
     def _measure_string(self, frame: Frame, place: Place, shift: CameraShift) -> None:
         px, py = self.pivot or self.swing.pivot_px
@@ -333,15 +374,22 @@ class Follower(Known):
 
     def _is_repeat(self, frame: Frame) -> bool:
         """Is it the picture before, shown again?"""
-        coarse = frame.luma[4::16, 4::16].astype(np.int16)
+        coarse = _coarse(frame)
         before, self._print = self._print, coarse
         return before is not None and bool(np.abs(coarse - before).max() <= 1)
 
 
-def _back_at(patch: Patch, place: Place, offsets: np.ndarray) -> np.ndarray:
-    """The background's brightness at these (2, n) offsets from a place, px, as far as the patch reaches."""
-    columns = np.round(place.x_px - patch.x_px + offsets[0]).astype(int)
-    rows = np.round(place.y_px - patch.y_px + offsets[1]).astype(int)
+def _coarse(frame: Frame) -> np.ndarray:
+    """A few of its pixels, int16."""
+    return frame.luma[4::16, 4::16].astype(np.int16)
+
+
+def _back_at(patch: Patch, place: Place, reach_px: float, offsets: np.ndarray) -> np.ndarray:
+    """The background's brightness at these (2, n) offsets from a place, in units of `reach_px`, as far as the patch reaches."""
+    x, y = place.x_px - patch.x_px, place.y_px - patch.y_px
+    columns, rows = np.rint(reach_px * offsets + np.array([[x], [y]])).astype(int)
     height, width = patch.back.shape
-    inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
-    return patch.back[rows[inside], columns[inside]]
+    if not (reach_px <= x <= width - 1 - reach_px and reach_px <= y <= height - 1 - reach_px):
+        inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
+        columns, rows = columns[inside], rows[inside]
+    return patch.back[rows, columns]

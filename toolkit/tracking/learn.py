@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from toolkit.trackers import load_tracker
-from toolkit.trackers.disc import fit_disc
-from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch
+from toolkit.sentence import said
+from toolkit.trackers import load_tracker, tracker_names
+from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.tracking.acquire import Rough, cut, is_even, scattered
 from toolkit.tracking.background import Background
+from toolkit.tracking.looks import Looks, Sightings, learn_looks
 from toolkit.tracking.search import still_picture
+from toolkit.tracking.shadow import Shaded, Shadow, find_shadow
 from toolkit.tracking.sight import LUMA
 from toolkit.tracking.stillness import STILL, Anchors, CameraShift
 from toolkit.tracking.swing import Swing, fit_swing
 from toolkit.video import Frame
 
 _CHECK_EVERY = 12
+
+
+class Trial(NamedTuple):
+    """A localiser on the frames read ahead: the motion fitted to its places, and what misfit and how much of the outline (at
+    two speeds) are ordinary for it."""
+
+    localiser: Localiser
+    swing: Swing
+    misfit: float
+    visible: tuple[tuple[float, float], tuple[float, float]]
 
 
 class Known:
@@ -38,18 +52,21 @@ class Known:
         self.swing = rough.swing
         self.interval_s = float(np.median(np.diff([f.t_s for f in batch]))) or 1 / 30
         points = self._learn_stillness(batch, rough)
-        self.found = {batch[i].index: p for i, p in points.items()}
+        self.shadow: Shadow | None = None
         self._learn_background(batch, rough.look, points)
-        self.growth: tuple[float, ...] | None = None  # slope and intercept of the bob's radius along x
-        self.look, self.exposure_s = self._learn_looks(batch, rough.look, points, radius)
-        if not is_even(self.look):
-            # what else there is beside the bob (a shadow) was fitted too, unless it must stand out as none of it
-            strict = rough.look._replace(noise=0.05 * abs(rough.look.contrast) + 1.0)
-            look, exposure_s = self._learn_looks(batch, strict, points, radius)
-            if look.noise < 0.6 * self.look.noise:
-                self.look, self.exposure_s = look, exposure_s
+        looks = self._learn_looks(batch, rough.look, points, radius)
+        shaded = self._learn_shadow(batch, looks.look, points)
+        if shaded is not None:
+            self.shadow = shaded.shadow
+            points = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
+            bare = looks.look._replace(radius_px=radius or shaded.radius_px, edge_px=shaded.edge_px)
+            self._learn_background(batch, bare, points)
+            looks = self._learn_looks(batch, bare, points, radius)
+        self.look, self.exposure_s, self.growth = looks
+        self.found = {batch[i].index: p for i, p in points.items()}
         self.ordinary_misfit = self.look.noise
-        self.ordinary_visible = 0.85
+        self.ordinary_visible: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 1.0), (0.85, 0.85))
+        self.choice = ""  # how the localiser was chosen, where there was a choice
         self.localiser: Localiser = self._choose(batch, points, wanted)
 
     def _learn_stillness(self, batch: list[Frame], rough: Rough) -> dict[int, tuple[float, float]]:
@@ -72,7 +89,10 @@ class Known:
         points = dict(rough.points)
         if len(self.anchors) == 0:
             return points
-        probe = [self.anchors.shift(batch[i].luma) for i in range(0, len(batch), max(1, len(batch) // 12))]
+        some = [batch[i].luma for i in range(0, len(batch), max(1, len(batch) // 12))]
+        probe = [self.anchors.shift(luma) for luma in some]
+        if self.anchors.forget_passing():
+            probe = [self.anchors.shift(luma) for luma in some]
         seen = [s for s in probe if s is not None]
         if len(seen) < 4:
             return points
@@ -110,7 +130,7 @@ class Known:
                 if c - a < 4 or d - b < 4:
                     continue
                 piece = self.sight.window(batch[i], a + dx, b + dy, c + dx, d + dy)
-                self.back.add(piece, (a, b, c, d), (x, y, 1.1 * look.radius_px + 2 * look.edge_px + 2), pivot)
+                self.back.add(piece, (a, b, c, d), self._dark(x, y, 1.1 * look.radius_px + 2 * look.edge_px + 2), pivot)
         self.back.fill_gaps((x0, y0, x1, y1))
         beyond = np.ones(self.shape, bool)  # where the bob was not found (yet) the picture is what stands still
         beyond[y0:y1, x0:x1] = False
@@ -120,115 +140,94 @@ class Known:
         np.copyto(self.back.mean, still, where=beyond)
         self.back.seen[beyond] = 1.0
 
+    def _dark(self, x: float, y: float, reach: float) -> tuple[float, float, float]:
+        """The circle (x, y, radius) in which the bob, or its shadow, changes the background."""
+        return (x, y, reach) if self.shadow is None else self.shadow.circle(x, y, reach)
+
+    def _learn_shadow(self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]]) -> Shaded | None:
+        """The shadow beside a bob of this look, from the frames on which it is slow."""
+        if not look.even or self.sight.weights != LUMA:
+            return None
+        numbers = np.array(list(points))
+        speed = np.hypot(*self.swing.velocity(np.array([batch[i].t_s for i in numbers])))
+        slow = numbers[np.argsort(speed)[: max(10, numbers.size // 3)]]
+        half = (2.5 * look.radius_px + 12,) * 2
+        seen = []
+        for i in slow[:: max(1, slow.size // 10)]:
+            guess = self._guess(*points[i], 0.0, 0.0)
+            patch = self._patch(batch[i], look, guess, half)
+            if patch is not None:
+                seen.append((patch, guess))
+        return find_shadow(seen, look)
+
     def _learn_looks(
         self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]], radius: float | None
-    ) -> tuple[Look, float]:
-        """Radius and edge from fits where the bob is slow, the exposure from the streak where it is fast."""
-        numbers = np.array(list(points))
-        vx, vy = self.swing.velocity(np.array([batch[i].t_s for i in numbers]))
-        speed = np.hypot(vx, vy)
-        found_px = look.radius_px
+    ) -> Looks:
+        """The looks of the bob at these points; those of `look`, but by its outline alone, where no disc can be fitted."""
+        numbers = list(points)
+        velocity = self.swing.velocity(np.array([batch[i].t_s for i in numbers]))
 
-        def fit(k: int, look: Look, part: float, **how: bool | int) -> np.ndarray | None:
-            i = numbers[k]
-            guess = self._guess(*points[i], part * vx[k], part * vy[k])
-            patch = self._patch(batch[i], look, guess)
-            if patch is None:
-                return None
-            quiet.append(1.4826 * float(np.median(np.abs(patch.image - light_on(patch) * patch.back))))
-            out = fit_disc(patch, look, guess, **how)  # type: ignore[arg-type]
-            if out is not None and how.get("calibrate") and not radius:
-                # half out of the picture, or a shadow taken for a part of it: no size to learn from
-                x, y, size = out[0] + patch.x_px, out[1] + patch.y_px, float(out[2])
-                rim = min(x, y, self.shape[1] - 1 - x, self.shape[0] - 1 - y)
-                if rim < size + 2 or not 0.8 < size / found_px < 1.25:
-                    return None
-            return out
+        def show(k: int, look: Look, centre: tuple[float, float], streak_s: float) -> tuple[Guess, Patch | None]:
+            guess = self._guess(*centre, *(float(v[k]) * streak_s for v in velocity))
+            return guess, self._patch(batch[numbers[k]], look, guess)
 
-        quiet: list[float] = []  # the wall's own noise
-        exposure = 0.0
-        xs_middle = float(np.median([p[0] for p in points.values()]))
-        for _ in range(2):  # the streak widens the edge, the edge shortens the streak
-            slow = np.argsort(speed)[: max(8, numbers.size // 4)]
-            slow = slow[:: max(1, slow.size // 16)][:16]
-            found = [fit(k, look, exposure, calibrate=True, turns=8) for k in slow]
-            fits = [f for f in found if f is not None]
-            drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(quiet or [0.0]))  # more misfit than noise leaves
-            if look.even and fits and np.median([f[13] for f in fits]) > drawn:
-                look = look._replace(even=False)  # a pattern or a highlight: the outline alone counts
-                found = [fit(k, look, exposure, calibrate=True, turns=8) for k in slow]
-                fits = [f for f in found if f is not None]
-            if len(fits) >= 3:
-                middle = np.median(np.array(fits), axis=0)
-                size, edge, contrast, noise = (float(middle[n]) for n in (2, 3, 9, 7))
-                look = Look(radius or size, max(0.35, edge), contrast, noise, even=look.even)
-                left = np.array([points[numbers[k]][0] < xs_middle for k, f in zip(slow, found) if f is not None])
-                sizes = np.array([f[2] for f in fits])
-                if not radius and 3 <= left.sum() <= left.size - 3:
-                    spread = np.hypot(
-                        sizes[left].std() / np.sqrt(left.sum()), sizes[~left].std() / np.sqrt((~left).sum())
-                    )
-                    change = abs(sizes[left].mean() - sizes[~left].mean())
-                    where = np.array([points[numbers[k]][0] for k, f in zip(slow, found) if f is not None])
-                    self.growth = tuple(np.polyfit(where, sizes, 1)) if change > max(0.05, 4 * spread) else None
-                    look = look._replace(radius_free=bool(change > max(0.05, 4 * spread)))
-            if (
-                not look.even and look.noise > drawn
-            ):  # a pattern up to the outline: size and streak cannot be told by it
-                return look._replace(radius_free=False), 0.0
-            if speed.max() * self.interval_s < 1.0:
-                break
-            fast = np.argsort(-speed)[:10]
-            trials = np.linspace(0, 1, 11)
-            each = np.full((trials.size, fast.size), np.inf)
-            for j, part in enumerate(trials):
-                for n, k in enumerate(fast):
-                    trial = fit(k, look, part * self.interval_s, turns=6)
-                    if trial is not None:
-                        each[j, n] = trial[7] ** 2
-            clear = np.argsort(each.min(axis=0))[:6]  # not those on which something hides a part of it
-            cost = each[:, clear].sum(axis=1)
-            if not np.isfinite(cost).any():
-                break
-            j = int(np.argmin(cost))
-            best = trials[j]
-            if 0 < j < trials.size - 1 and np.all(np.isfinite(cost[j - 1 : j + 2])):
-                a, b, c = cost[j - 1 : j + 2]
-                best += 0.1 * 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
-            exposure = float(max(0.0, best) * self.interval_s)
-        return look, exposure
+        x, y = np.array(list(points.values())).T
+        seen = Sightings(x, y, *velocity, show)
+        # what else there is beside the bob (a shadow) is fitted too, unless it must stand out as none of it
+        strict = look._replace(noise=0.05 * abs(look.contrast) + 1.0)
+        found = learn_looks(seen, look, radius, self.interval_s, self.shape)
+        if found is None or not is_even(found.look):
+            other = learn_looks(seen, strict, radius, self.interval_s, self.shape)
+            if other is not None and (found is None or other.look.noise < 0.6 * found.look.noise):
+                found = other
+        return found or Looks(look._replace(even=False))
 
     def _choose(self, batch: list[Frame], points: dict[int, tuple[float, float]], wanted: str | None) -> Localiser:
-        """The localiser asked for; else the disc fit where its model holds; else whichever scatters least about the
-        motion. Also learns how large a misfit is ordinary for it."""
+        """The localiser asked for; else the disc fit where its model holds; else of all there are the one whose model leaves
+        least of the picture unexplained (χ²), `choice` says of which. Also learns what is ordinary for it."""
         names = [wanted] if wanted else ["disc"]
         if not wanted and (not self.look.even or self.look.noise > 0.05 * abs(self.look.contrast) + 2.5):
-            names.append("edge")
-        numbers = list(points)
-        vx, vy = (v * self.exposure_s for v in self.swing.velocity(np.array([batch[i].t_s for i in numbers])))
-        best, least = load_tracker(names[0]), np.inf
-        for name in names:
-            candidate = load_tracker(name)
-            found = []
-            for k, i in enumerate(numbers):
-                guess = self._guess(*points[i], float(vx[k]), float(vy[k]))
-                patch = self._patch(batch[i], self.look, guess)
-                place = NOWHERE if patch is None else candidate.locate(patch, self.look, guess)
-                if np.isfinite(place.x_px) and place.visible > 0.6:
-                    found.append((batch[i].t_s, place.x_px, place.y_px, place.misfit, place.visible))
-            if len(found) < max(10, 0.5 * len(points)):
-                continue
-            t, x, y, misfit, visible = np.array(found).T
-            swing = fit_swing(t, x, y, np.full(t.size, 0.1), restarted(self.swing, t[0]))
-            # a pattern draws the disc fit along with its turning, slowly: a swing fitted to so few frames hides some of that
-            favour = 1.0 if name != "disc" else 0.9 if self.look.even else 1.3
-            if swing is not None and swing.rms_px * favour < least:
-                best, least = candidate, swing.rms_px * favour
-                self.ordinary_misfit = float(np.percentile(misfit, 90))
-                # a rolling shutter shears the outline where the bob is fast: what is ordinary is not hidden
-                self.ordinary_visible = float(np.clip(np.median(visible) - 0.1, 0.65, 0.85))
-                self.swing = swing
-        return best
+            names += [name for name in tracker_names() if name != "disc"]
+        tried = [t for t in (self._try(load_tracker(name), batch, points) for name in names) if t is not None]
+        if not tried:
+            return load_tracker(names[0])
+        if len(names) > 1:
+            self.choice = _told_choice(tried, abs(self.look.contrast))
+        calm = 2.0 * min(t.swing.rms_px for t in tried) + 0.05  # whatever it explains, what leaps about was not found
+        # a model with more freedom leaves less of any picture
+        best = min(
+            (t for t in tried if t.swing.rms_px < calm),
+            key=lambda t: t.misfit * (0.7 if t.localiser.name == "disc" else 1.0),
+        )
+        self.swing, self.ordinary_misfit, self.ordinary_visible = best.swing, best.misfit, best.visible
+        return best.localiser
+
+    def _try(self, localiser: Localiser, batch: list[Frame], points: dict[int, tuple[float, float]]) -> Trial | None:
+        """What this localiser makes of the frames on which the bob was found; None where it sees it on too few."""
+        velocity = self.swing.velocity(np.array([batch[i].t_s for i in points]))
+        places = {}
+        for i, vx, vy in zip(points, *(v * self.exposure_s for v in velocity)):
+            guess = self._guess(*points[i], float(vx), float(vy))
+            patch = self._patch(batch[i], self.look, guess)
+            place = NOWHERE if patch is None else localiser.locate(patch, self.look, guess)
+            place, _ = self._beside_shadow(localiser, batch[i], guess, place) or (place, patch)
+            if np.isfinite(place.x_px) and place.visible > 0.6:
+                places[i] = place
+        if len(places) < 10 or len(places) <= 0.5 * len(points):
+            return None
+        t = np.array([batch[i].t_s for i in places])
+        x, y, misfit, visible = np.array([(p.x_px, p.y_px, p.misfit, p.visible) for p in places.values()]).T
+        swing = fit_swing(t, x, y, np.full(t.size, 0.1), restarted(self.swing, t[0]))
+        if swing is None:
+            return None
+        # not beside a frame on which it was not found: something hid a part of it there
+        clear = np.array(
+            [all(k in places for k in (i - 2, i - 1, i + 1, i + 2) if 0 <= k < len(batch)) for i in places]
+        )
+        if clear.sum() < 10:
+            clear[:] = True
+        speeds = np.hypot(*swing.velocity(t))
+        return Trial(localiser, swing, float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear]))
 
     # --- geometry -------------------------------------------------------------------------------------------------
 
@@ -264,6 +263,17 @@ class Known:
         size = self.growth[0] * guess.x_px + self.growth[1]
         return self.look._replace(radius_px=float(np.clip(size, 0.75 * self.look.radius_px, 1.3 * self.look.radius_px)))
 
+    def _beside_shadow(
+        self, localiser: Localiser, frame: Frame, guess: Guess, place: Place
+    ) -> tuple[Place, Patch] | None:
+        """Where the bob has a shadow: the place found once more, with the shadow of a bob there; and the patch."""
+        if self.shadow is None or not np.isfinite(place.x_px):
+            return None
+        near = guess._replace(x_px=place.x_px, y_px=place.y_px)
+        patch = self._patch(frame, self.look, near)
+        again = NOWHERE if patch is None else localiser.locate(patch, self.look_at(near), near)
+        return None if patch is None or not np.isfinite(again.x_px) else (again, patch)
+
     def _patch(self, frame: Frame, look: Look, guess: Guess, half: tuple[float, float] | None = None) -> Patch | None:
         """The patch about the guess, with the background behind it, in the pixels of a still camera; as large as the bob
         and its streak need, or ±half."""
@@ -278,9 +288,29 @@ class Known:
         x0, y0 = int(patch.x_px) - round(dx), int(patch.y_px) - round(dy)
         if not self.shaking:
             window = (slice(y0, y0 + rows), slice(x0, x0 + columns))
-            return patch._replace(back=self.back.mean[window], seen=self.back.seen[window])
-        back, seen = self.back.window(x0, y0, columns, rows, dx - round(dx), dy - round(dy))
-        return Patch(patch.image, back, seen, patch.x_px - dx, patch.y_px - dy)
+            patch = patch._replace(back=self.back.mean[window], seen=self.back.seen[window])
+        else:
+            back, seen = self.back.window(x0, y0, columns, rows, dx - round(dx), dy - round(dy))
+            patch = Patch(patch.image, back, seen, patch.x_px - dx, patch.y_px - dy)
+        return patch if self.shadow is None else self.shadow.cast(patch, guess)
+
+
+def _by_speed(speed: np.ndarray, visible: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
+    """How much of the outline is to be seen at least, at two speeds (px/s): a rolling shutter shears it where the bob is fast,
+    and what is seen on nine frames of ten is not hidden."""
+    fast = speed > np.median(speed)
+    least = [float(np.clip(np.percentile(visible[part], 10) - 0.05, 0.65, 0.85)) for part in (~fast, fast)]
+    return (float(np.median(speed[~fast])), float(np.median(speed[fast]))), (least[0], least[1])
+
+
+def _told_choice(tried: list[Trial], contrast: float) -> str:
+    return said(
+        "track.choice",
+        "The disc fit's model of the bob does not hold. What each localiser's leaves of its contrast: {left}.",
+        left=", ".join(
+            f"{t.localiser.name} {t.misfit / max(contrast, 1.0):.0%}" for t in sorted(tried, key=lambda t: t.misfit)
+        ),
+    )
 
 
 def restarted(swing: Swing, t0: float) -> np.ndarray:
@@ -289,11 +319,3 @@ def restarted(swing: Swing, t0: float) -> np.ndarray:
     values = swing.values.copy()
     values[7:] = theta[0], rate[0]
     return values
-
-
-def light_on(patch: Patch) -> float:
-    """How bright the light is against that of the background."""
-    known = patch.seen > 0
-    if np.count_nonzero(known) < 20:
-        return 1.0
-    return float(np.clip(np.median(patch.image[known] / np.maximum(patch.back[known], 1.0)), 0.3, 3.0))

@@ -1,0 +1,101 @@
+"""How the bob looks, learned from pictures drawn here; and the rules of the follower that rest on it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+from test_search import disc, swinging
+from test_track import H, W, film
+
+from toolkit.track import OK, track
+from toolkit.trackers.localiser import Guess, Look, Patch
+from toolkit.tracking.learn import _by_speed
+from toolkit.tracking.looks import Sightings, learn_looks
+from toolkit.tracking.stillness import Anchors
+
+pytest.importorskip("av")
+pytest.importorskip("cv2")
+
+RADIUS, EDGE, INTERVAL = 11.5, 0.7, 1 / 30
+
+
+def streaked(x, y, streak):
+    """A dark disc smeared evenly along `streak` (px, along x) before a wall of 180."""
+    rows, columns = np.mgrid[0:100, 0:160]
+    at = x + streak * (np.arange(33) / 32 - 0.5)
+    bob = np.mean([ndtr((RADIUS - np.hypot(columns - a, rows - y)) / EDGE) for a in at], axis=0)
+    return 180.0 - 110.0 * bob
+
+
+def sightings(exposure_s, lag=0.0):
+    """A bob seen at speeds up to 1500 px/s, thought `lag` px above where it is where it is fast."""
+    rng = np.random.default_rng(4)
+    speed = np.linspace(5.0, 1500.0, 30)
+    x, y = rng.uniform(75, 85, 30), rng.uniform(45, 55, 30)
+    pictures = [streaked(a, b, v * exposure_s) + rng.normal(0, 1.5, (100, 160)) for a, b, v in zip(x, y, speed)]
+    wall, often = np.full((100, 160), 180, np.float32), np.full((100, 160), 9, np.float32)
+
+    def show(k, look, centre, streak_s):
+        return Guess(*centre, speed[k] * streak_s, 0.0), Patch(pictures[k].astype(np.float32), wall, often, 0.0, 0.0)
+
+    return Sightings(x, y - lag * speed / speed.max(), speed, 0 * speed, show)
+
+
+@pytest.mark.parametrize("exposure_s", [0.009, 0.013])
+@pytest.mark.parametrize("lag", [0.0, 6.0])
+def test_the_exposure_is_told_by_the_streak(exposure_s, lag):
+    """Also where the places were found without knowing of it, beyond the reach of a sharp disc; and an empty wall, which a
+    long faint streak fits well, says nothing."""
+    found = learn_looks(sightings(exposure_s, lag), Look(RADIUS, 2.5, -105.0, 8.0), None, INTERVAL, (100, 160))
+    assert found.exposure_s == pytest.approx(exposure_s, abs=0.1 * INTERVAL)
+    assert found.look.radius_px == pytest.approx(RADIUS, abs=0.1)
+    assert found.look.edge_px == pytest.approx(EDGE, abs=0.25)
+    assert found.look.even
+
+
+def test_what_a_rolling_shutter_shears_is_not_hidden():
+    speed = np.linspace(0, 1000, 100)
+    (slow, fast), (least_slow, least_fast) = _by_speed(speed, np.where(speed > 700, 0.8, 1.0))
+    assert slow < 300 < 700 < fast
+    assert least_slow == 0.85
+    assert 0.65 <= least_fast <= 0.8
+
+
+def test_a_window_on_something_that_moves_is_no_anchor():
+    rng = np.random.default_rng(6)
+    wall = 150 + rng.normal(0, 1, (240, 320))
+    for x, y in ((40, 60), (250, 180), (60, 190)):
+        wall[y - 9 : y + 9, x - 12 : x + 12] = 70.0
+    pictures = []
+    for k in range(8):
+        picture = wall.copy()
+        picture[100:120, 40 + 30 * k : 60 + 30 * k] = 90.0  # it passes
+        pictures.append(np.clip(picture, 0, 255).astype(np.uint8))
+    anchors = Anchors(pictures[0], np.zeros((240, 320), bool))
+    passing = [100 - 8 <= y <= 120 + 8 for _, y in anchors.points]
+    assert 0 < sum(passing) < len(passing)
+    for picture in pictures[1:]:
+        anchors.shift(picture)
+    assert anchors.forget_passing()
+    assert not any(100 - 8 <= y <= 120 + 8 for _, y in anchors.points)
+    assert len(anchors) == len(passing) - sum(passing)
+    shift = anchors.shift(pictures[3])
+    assert np.hypot(shift.x_px, shift.y_px) < 0.1
+
+
+def test_a_dark_thing_behind_the_bob_in_fading_light_hides_no_frame(tmp_path):
+    """It has a fifth of its contrast there, and the wall beside it tells nothing of the light; but its outline is clear."""
+
+    def light(t):
+        return 1 - 1.2 * np.clip(t - 1.75, 0.0, 0.4)
+
+    frames, x, y = swinging(3.0, light=light)
+    for k in range(100, 180):  # after the frames read ahead
+        left = 4 * (k - 100)
+        bare = 1 - disc(x[k], y[k], 11.0, (H, W))
+        bare[:, : max(0, left - 60)] = bare[:, left:] = 0.0
+        frames[k][:] = np.where(bare > 0.5, 85 * light(k / 60), frames[k]).astype(np.uint8)
+    found = track(film(tmp_path / "behind.mp4", frames))
+    assert (found.status == OK).mean() > 0.93
+    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 1.0

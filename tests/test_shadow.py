@@ -1,0 +1,78 @@
+"""The bob's shadow on the wall: found beside the bob, and no longer taken for a part of it. Pictures drawn here, truth known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+from test_track import LENGTH, PIVOT, H, W, angles, film
+
+from toolkit.track import OK, track
+from toolkit.trackers.localiser import Guess, Look, Patch
+from toolkit.tracking.shadow import Shadow, find_shadow
+
+pytest.importorskip("av")
+pytest.importorskip("cv2")
+
+
+def covered(x, y, radius, edge, shape):
+    rows, columns = np.mgrid[0 : shape[0], 0 : shape[1]]
+    return ndtr((radius - np.hypot(columns - x, rows - y)) / edge)
+
+
+def picture(x, y, wall, shadow, rng):
+    bob = covered(x, y, 12.0, 0.7, wall.shape)
+    if shadow is not None:
+        right, down, radius, soft, strength = shadow
+        wall = wall * (1 - strength * covered(x + right, y + down, radius, soft, wall.shape))
+    return (wall * (1 - bob) + 70.0 * bob + rng.normal(0, 1.5, wall.shape)).astype(np.float32)
+
+
+def seen(shadow, off=(0.0, 0.0)):
+    """Patches of a bob that is taken to be `off` px from where it is, before a wall with a slope."""
+    rng = np.random.default_rng(5)
+    wall = 170 + 0.2 * np.arange(110)[None, :] * np.ones((110, 1)).astype(np.float32)
+    found = []
+    for _ in range(8):
+        x, y = rng.uniform(48, 60, 2)
+        shown = picture(x, y, wall, shadow, rng)
+        patch = Patch(shown, wall.astype(np.float32), np.full(wall.shape, 9.0, np.float32), 0.0, 0.0)
+        found.append((patch, Guess(x + off[0], y + off[1], string_rad=-1.6)))
+    return found
+
+
+@pytest.mark.parametrize("shadow", [(-7.0, 8.0, 12.0, 4.0, 0.45), (16.0, 20.0, 12.0, 3.0, 0.3)])
+def test_bob_and_shadow_are_told_apart(shadow):
+    # a fit of one disc to both lies between them, too large
+    found = find_shadow(seen(shadow, (0.3 * shadow[0], 0.3 * shadow[1])), Look(13.5, 2.5, -90.0, 10.0))
+    assert found is not None
+    assert np.all(np.abs(np.subtract(found.shadow, shadow)) < [0.5, 0.5, 0.5, 0.5, 0.03])
+    assert np.hypot(found.x_px + 0.3 * shadow[0], found.y_px + 0.3 * shadow[1]) < 0.1
+    assert found.radius_px == pytest.approx(12.0, abs=0.1)
+
+
+def test_no_shadow_is_found_where_there_is_none():
+    assert find_shadow(seen(None), Look(12.0, 0.7, -100.0, 2.0)) is None
+    assert find_shadow(seen(None), Look(12.0, 0.7, -100.0, 30.0)) is None
+
+
+def test_the_circle_holds_bob_and_shadow():
+    x, y, radius = Shadow(9.0, -12.0, 10.0, 2.0, 0.4).circle(100.0, 50.0, 13.0)
+    assert np.hypot(x - 100, y - 50) + 13 == pytest.approx(radius)
+    assert np.hypot(x - 109, y - 38) + 14 == pytest.approx(radius)
+    assert Shadow(1.0, 0.0, 10.0, 0.5, 0.4).circle(0.0, 0.0, 13.0) == (0.0, 0.0, 13.0)
+
+
+def test_a_bob_with_a_shadow_that_it_overlaps_is_tracked_to_a_tenth_of_a_pixel(tmp_path):
+    rng = np.random.default_rng(1)
+    theta = angles(np.arange(120) / 60)
+    x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
+    wall = np.full((H, W), 185.0)
+    shadow = (-7.0, 8.0, 12.0, 4.0, 0.45)
+    frames = [np.clip(picture(a, b, wall, shadow, rng), 0, 255).astype(np.uint8) for a, b in zip(x, y)]
+    found = track(film(tmp_path / "shadow.mp4", frames))
+    assert (found.status == OK).mean() > 0.97
+    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
+    off = np.hypot(np.mean(found.x_px - x), np.mean(found.y_px - y))
+    assert off < 0.1  # a disc alone lies 3 px towards the shadow
+    assert found.radius_px == pytest.approx(12.0, abs=0.2)

@@ -1,0 +1,162 @@
+"""How the bob looks: size and edge from fits where it is slow, the exposure from the streak where it is fast."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from toolkit.trackers.disc import fit_disc
+from toolkit.trackers.localiser import Guess, Look, Patch
+
+# what `fit_disc` gives
+_RADIUS, _EDGE, _MISFIT, _VISIBLE, _CONTRAST, _WITHIN = 2, 3, 7, 8, 9, 13
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """The bob where it was found: centre x_px, y_px and velocity vx, vy (px/s), all (n,), and `show`, which gives the guess
+    and the patch (or None) of sighting k for a bob of these looks, centred there, that draws so long a streak (s)."""
+
+    x_px: np.ndarray
+    y_px: np.ndarray
+    vx: np.ndarray
+    vy: np.ndarray
+    show: Callable[[int, Look, tuple[float, float], float], tuple[Guess, Patch | None]]
+
+    def fit(self, k: int, look: Look, streak_s: float, **how: float) -> np.ndarray | None:
+        """The disc fitted to sighting k, its centre in pixels of the picture; None where there is none."""
+        return self._fit(k, look, (float(self.x_px[k]), float(self.y_px[k])), streak_s, how)
+
+    def fit_from_far(self, k: int, look: Look, streak_s: float) -> np.ndarray | None:
+        """`fit`; and where this sees no outline, once more from where a soft edge, which reaches farther, finds it."""
+        out = self.fit(k, look, streak_s, turns=6)
+        if out is not None and out[_VISIBLE] > 0.5:
+            return out
+        soft = self.fit(k, look._replace(noise=np.inf), streak_s, turns=12, soften=2.5)
+        return None if soft is None else self._fit(k, look, (soft[0], soft[1]), streak_s, {"turns": 6})
+
+    def _fit(
+        self, k: int, look: Look, centre: tuple[float, float], streak_s: float, how: dict[str, float]
+    ) -> np.ndarray | None:
+        guess, patch = self.show(k, look, centre, streak_s)
+        out = None if patch is None else fit_disc(patch, look, guess, **how)  # type: ignore[arg-type]
+        if patch is not None and out is not None:
+            out[:2] += patch.x_px, patch.y_px
+        return out
+
+    def noise(self, k: int, look: Look) -> float:
+        """The wall's own noise about sighting k, grey levels; NaN where nothing is seen."""
+        patch = self.show(k, look, (float(self.x_px[k]), float(self.y_px[k])), 0.0)[1]
+        return (
+            np.nan if patch is None else 1.4826 * float(np.median(np.abs(patch.image - light_on(patch) * patch.back)))
+        )
+
+
+class Looks(NamedTuple):
+    """The looks learned, the exposure (s), and how the radius grows along x (slope, intercept) if it does."""
+
+    look: Look
+    exposure_s: float = 0.0
+    growth: tuple[float, float] | None = None
+
+
+def learn_looks(
+    seen: Sightings, look: Look, radius: float | None, interval_s: float, shape: tuple[int, ...]
+) -> Looks | None:
+    """The looks of the bob seen, from about `look`; its `radius` if that is known. None where hardly a fit succeeds."""
+    speed = np.hypot(seen.vx, seen.vy)
+    slow = np.argsort(speed)[: max(8, speed.size // 4)]
+    slow = slow[:: max(1, slow.size // 16)][:16]
+    fast = np.argsort(-speed)[:10]
+    walls = [w for w in (seen.noise(k, look) for k in slow) if np.isfinite(w)]
+    drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(walls or [0.0]))  # more misfit than noise leaves
+    found_px, learned = look.radius_px, Looks(look)
+
+    def sized(look: Look, exposure_s: float) -> dict[int, np.ndarray]:
+        fits = ((int(k), seen.fit(k, look, exposure_s, calibrate=True, turns=8)) for k in slow)
+        return {k: f for k, f in fits if f is not None and (radius or _whole(f, found_px, shape))}
+
+    for turn in range(2):  # the streak widens the edge, the edge shortens the streak
+        fits = sized(look, learned.exposure_s)
+        if look.even and (len(fits) < 3 or np.median([f[_WITHIN] for f in fits.values()]) > drawn):
+            patterned = look._replace(even=False)  # a pattern or a highlight: the outline alone counts
+            outlined = sized(patterned, learned.exposure_s)
+            if len(fits) >= 3 or len(outlined) >= 3:
+                look, fits = patterned, outlined
+        if len(fits) < 3 and turn == 0:
+            return None
+        if len(fits) >= 3:
+            look, growth = _size(look, fits, seen.x_px, radius)
+            learned = Looks(look, learned.exposure_s, growth)
+        if not look.even and look.noise > drawn:
+            return Looks(look._replace(radius_free=False))  # a pattern up to the outline: it tells no size, no streak
+        if speed.max() * interval_s < 1.0:
+            break
+        exposure_s = _exposure(seen, look, fast, interval_s)
+        if exposure_s is None:
+            break
+        learned = learned._replace(exposure_s=exposure_s)
+    return learned
+
+
+def _whole(fit: np.ndarray, found_px: float, shape: tuple[int, ...]) -> bool:
+    """Can a size be learned here? Not half out of the picture, nor where a shadow was taken for a part of the bob."""
+    size = float(fit[_RADIUS])
+    rim = min(fit[0], fit[1], shape[1] - 1 - fit[0], shape[0] - 1 - fit[1])
+    return bool(rim >= size + 2 and 0.8 < size / found_px < 1.25)
+
+
+def _size(
+    look: Look, fits: dict[int, np.ndarray], x_px: np.ndarray, radius: float | None
+) -> tuple[Look, tuple[float, float] | None]:
+    """The looks that most fits agree on; and the line along which the radius grows, where the bob is larger on one side."""
+    table = np.array(list(fits.values()))
+    middle = np.median(table, axis=0)
+    size, edge, contrast, noise = (float(middle[n]) for n in (_RADIUS, _EDGE, _CONTRAST, _MISFIT))
+    look = look._replace(radius_px=radius or size, edge_px=max(0.35, edge), contrast=contrast, noise=noise)
+    sizes, where = table[:, _RADIUS], x_px[list(fits)]
+    left = where < float(np.median(x_px))
+    if radius or not 3 <= left.sum() <= left.size - 3:
+        return look._replace(radius_free=False), None
+    spread = np.hypot(sizes[left].std() / np.sqrt(left.sum()), sizes[~left].std() / np.sqrt((~left).sum()))
+    if abs(sizes[left].mean() - sizes[~left].mean()) <= max(0.05, 4 * spread):
+        return look._replace(radius_free=False), None
+    slope, intercept = np.polyfit(where, sizes, 1)
+    return look._replace(radius_free=True), (float(slope), float(intercept))
+
+
+def _exposure(seen: Sightings, look: Look, fast: np.ndarray, interval_s: float) -> float | None:
+    """The exposure whose streak fits the fastest sightings best; None where hardly one is fitted.
+
+    A fit that sees no outline says nothing: a long faint streak fits an empty wall well.
+    """
+    trials = np.linspace(0, 1, 11)
+    cost = np.full((trials.size, fast.size), np.nan)
+    for j, part in enumerate(trials):
+        for n, k in enumerate(fast):
+            fit = seen.fit_from_far(k, look, part * interval_s)
+            if fit is not None and fit[_VISIBLE] > 0.5:
+                cost[j, n] = fit[_MISFIT] ** 2
+    cost = cost[:, np.isfinite(cost).sum(axis=0) >= 3]
+    if cost.shape[1] < 3:
+        return None
+    cost = np.where(np.isfinite(cost), cost, np.nanmax(cost, axis=0))
+    clear = np.argsort(cost.min(axis=0))[:6]  # not those on which something hides a part of it
+    total = cost[:, clear].sum(axis=1)
+    j = int(np.argmin(total))
+    best = trials[j]
+    if 0 < j < trials.size - 1:
+        a, b, c = total[j - 1 : j + 2]
+        best += 0.1 * 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
+    return float(max(0.0, best) * interval_s)
+
+
+def light_on(patch: Patch) -> float:
+    """How bright the light is against that of the background."""
+    known = patch.seen > 0
+    if np.count_nonzero(known) < 20:
+        return 1.0
+    return float(np.clip(np.median(patch.image[known] / np.maximum(patch.back[known], 1.0)), 0.3, 3.0))

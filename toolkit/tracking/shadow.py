@@ -1,0 +1,157 @@
+"""The bob's shadow on the wall behind it: a soft disc that swings along at a fixed offset and takes the same share of light
+from whatever is there. Taken for a part of the bob it would draw its centre by pixels.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from toolkit.trackers.localiser import Guess, Look, Patch
+from toolkit.tracking.least_squares import least_squares
+
+_PIXELS = 3000  # so many are compared with the model
+_CLEAR = 8.0  # grey levels: what the model leaves counts less where it is more
+_DARK = 0.04  # share of light that is missed beside the bob wherever a shadow is looked for
+
+
+class Shadow(NamedTuple):
+    """Its centre less the bob's, its radius, the standard deviation of its edge (px), and the share of light it takes."""
+
+    right_px: float
+    down_px: float
+    radius_px: float
+    soft_px: float
+    strength: float
+
+    def light(self, right: np.ndarray, down: np.ndarray) -> np.ndarray:
+        """How much of the light is left at places relative to the bob's centre, px."""
+        d = np.hypot(right - self.right_px, down - self.down_px)
+        return 1 - self.strength * _covered(d, self.radius_px, self.soft_px)
+
+    def cast(self, patch: Patch, guess: Guess) -> Patch:
+        """The patch with a background on which the shadow of a bob at the guess lies, smeared along its streak."""
+        rows, columns = patch.back.shape
+        down = np.arange(rows)[:, None] + (patch.y_px - guess.y_px)
+        right = np.arange(columns)[None, :] + (patch.x_px - guess.x_px)
+        streak = float(np.hypot(guess.streak_x_px, guess.streak_y_px))
+        parts = np.arange(0.5, int(streak / self.soft_px) + 1) / (int(streak / self.soft_px) + 1) - 0.5
+        left = sum(self.light(right - p * guess.streak_x_px, down - p * guess.streak_y_px) for p in parts)
+        return patch._replace(back=(patch.back * (left / parts.size)).astype(np.float32))
+
+    def circle(self, x_px: float, y_px: float, radius_px: float) -> tuple[float, float, float]:
+        """The circle that holds one of this radius about the bob, and the shadow."""
+        far = float(np.hypot(self.right_px, self.down_px))
+        beyond = self.radius_px + 2 * self.soft_px
+        if far + beyond <= radius_px:
+            return x_px, y_px, radius_px
+        whole = 0.5 * (far + beyond + radius_px)
+        part = (whole - radius_px) / max(far, 1e-9)
+        return x_px + part * self.right_px, y_px + part * self.down_px, whole
+
+
+class Shaded(NamedTuple):
+    """A shadow, and what the bob is without it: its centre less where it was taken to be, its radius and edge, px."""
+
+    shadow: Shadow
+    x_px: float
+    y_px: float
+    radius_px: float
+    edge_px: float
+
+
+def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
+    """The shadow beside an even bob, by a disc and a soft darker disc behind it that are fitted to patches on which the bob is
+    slow (each with the guess at its centre). None where the bob alone explains them nearly as well."""
+    u, v, image, back, beside = _pixels(seen, look)
+    unlike = look.noise > 0.05 * abs(look.contrast) + 2.5  # a shadow that overlaps the bob is fitted as a part of it
+    if u.size < 200 or not (unlike or _light_is_missed(u, v, image, back, beside, look)):
+        return None
+    contrast = look.contrast or float(np.median(image) - np.median(back))
+    size = look.radius_px
+    alone = np.array([0, 0, size, look.edge_px, np.median(back) + contrast, 0, 0, 1.0, 0, size, 0, size, 3.0])
+    steps = np.array([1e-3, 1e-3, 1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3])
+
+    def fit(start: np.ndarray, free: range, every: int, turns: int) -> tuple[np.ndarray, float]:
+        some = slice(None, None, every)
+
+        def rest(values: np.ndarray) -> np.ndarray:
+            return _CLEAR * np.arcsinh((image[some] - _model(values, u[some], v[some], back[some])) / _CLEAR)
+
+        least = least_squares(rest, start, steps, free, turns=turns)
+        return (start, np.inf) if least is None else (least.values, least.chi2 / least.rest.size)
+
+    _, without = fit(alone, range(8), 1, 12)
+    starts = []
+    for far in (0.5 * size, 1.3 * size):
+        for angle in np.arange(8) * np.pi / 4:
+            start = alone.copy()
+            right, down = far * np.cos(angle), far * np.sin(angle)
+            start[:2] = -0.2 * right, -0.2 * down  # the bob alone was drawn towards its shadow
+            start[8:11] = right, down, 0.3
+            starts.append(fit(start, range(13), 4, 4))
+    starts.sort(key=lambda s: s[1])
+    values, with_it = min((fit(start, range(13), 1, 15) for start, _ in starts[:2]), key=lambda s: s[1])
+    cx, cy, radius, edge = (float(a) for a in values[:4])
+    shadow = Shadow(*(float(values[k]) for k in (8, 9, 11, 12, 10)))
+    far = float(np.hypot(shadow.right_px, shadow.down_px))
+    plausible = (
+        0.03 < shadow.strength < 0.95
+        and 0.6 < shadow.radius_px / radius < 1.6
+        and 0.6 < radius / size < 1.3
+        and shadow.soft_px > 0.3
+        and radius + 1 < far + shadow.radius_px < 6 * radius
+    )
+    if not plausible or with_it > 0.7 * without:
+        return None
+    return Shaded(shadow, cx, cy, radius, max(0.35, edge))
+
+
+def _pixels(
+    seen: list[tuple[Patch, Guess]], look: Look
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Some pixels of the patches but for the string: places relative to the guess, picture, background, and whether that was
+    seen there."""
+    taken = [np.empty((5, 0))]
+    for patch, guess in seen:
+        rows, columns = np.indices(patch.image.shape)
+        u, v = columns + patch.x_px - guess.x_px, rows + patch.y_px - guess.y_px
+        held = np.isfinite(guess.string_rad)
+        ux, uy = (float(f(guess.string_rad)) if held else 0.0 for f in (np.cos, np.sin))
+        along, across = u * ux + v * uy, np.abs(u * uy - v * ux)
+        bare = (along < 0.5 * look.radius_px) | (across > 5 + 0.1 * look.radius_px)
+        taken.append(np.stack([u, v, patch.image, patch.back, patch.seen > 0])[:, bare])
+    table = np.concatenate(taken, axis=1)
+    u, v, image, back, beside = table[:, :: max(1, table.shape[1] // _PIXELS)]
+    return u, v, image, back, beside > 0
+
+
+def _light_is_missed(
+    u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, beside: np.ndarray, look: Look
+) -> bool:
+    """Is it darker beside the bob, on one side of it, than where the bob is not?"""
+    near = np.hypot(u, v) / look.radius_px
+    ring = beside & (near > 1.1 + 2 * look.edge_px / look.radius_px) & (near < 2.2)
+    side = (np.arctan2(v, u) * 4 / np.pi).astype(int) % 8
+    light = [
+        np.median((image / np.maximum(back, 1.0))[ring & (side == k)])
+        for k in range(8)
+        if (ring & (side == k)).sum() > 8
+    ]
+    return len(light) >= 4 and bool(min(light) < np.median(light) - _DARK or np.median(light) < 1 - 2 * _DARK)
+
+
+def _model(values: np.ndarray, u: np.ndarray, v: np.ndarray, back: np.ndarray) -> np.ndarray:
+    cx, cy, radius, edge, shade, shade_x, shade_y, gain, right, down, strength, size, soft = values
+    x, y = u - cx, v - cy
+    bob = _covered(np.hypot(x, y), radius, edge)
+    wall = gain * back * (1 - strength * _covered(np.hypot(x - right, y - down), size, soft))
+    return wall * (1 - bob) + (shade + shade_x * x + shade_y * y) * bob
+
+
+def _covered(distance: np.ndarray, radius: float, edge: float) -> np.ndarray:
+    from scipy.special import ndtr
+
+    covered: np.ndarray = ndtr((radius - distance) / max(edge, 0.2))
+    return covered
