@@ -247,6 +247,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     x, y = (np.where(bridged, m, p) for m, p in ((joint.x_px, places.x_px), (joint.y_px, places.y_px)))
     spread = float(np.hypot(np.nanstd((places.x_px - joint.x_px)[good]), np.nanstd((places.y_px - joint.y_px)[good])))
     steps = np.diff(places.t_s)
+    if follower.choice:
+        log.append(follower.choice)
     log += [
         said(
             "track.followed",

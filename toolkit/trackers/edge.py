@@ -91,7 +91,7 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         found, variance, apart = _likeliest(cost, ux, uy, inside)
         step = unit * float(np.hypot(found[0], found[1]))
         centre += unit * np.clip(found[:2], -1.5, 1.5)
-        if unit == 1 and step < 0.05:  # the costs were taken on rays from there
+        if unit == 1 and step < 0.1:  # the costs were taken on rays from near there
             break
     if step > 0.3:
         return None

@@ -306,7 +306,7 @@ def _by_speed(speed: np.ndarray, visible: np.ndarray) -> tuple[tuple[float, floa
 def _told_choice(tried: list[Trial], contrast: float) -> str:
     return said(
         "track.choice",
-        "The disc fit's model of the bob does not hold. What each localiser's leaves of its contrast: {left}.",
+        "An even disc does not explain the bob. What each localiser leaves unexplained of its contrast: {left}.",
         left=", ".join(
             f"{t.localiser.name} {t.misfit / max(contrast, 1.0):.0%}" for t in sorted(tried, key=lambda t: t.misfit)
         ),
