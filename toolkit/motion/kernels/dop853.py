@@ -12,9 +12,10 @@ from typing import Any
 from numba import njit
 
 from toolkit.motion.kernels import dop853_table
+from toolkit.motion.kernels.events import SLACK, SLIP, STICK, note
 from toolkit.motion.kernels.friction import held_until, leave_rest
 from toolkit.motion.kernels.pointer import call_slack, call_terms, skip, unpack
-from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, ROW, TOO_MANY_STEPS
+from toolkit.motion.routes import DONE, NOT_FINITE, ROW, TOO_MANY_STEPS
 
 _WIDE, _E = dop853_table.A.shape[1], dop853_table.D.shape[1]
 _C = dop853_table.A.size
@@ -130,15 +131,10 @@ def dop853(places: Any) -> None:
                     until, way = held_until(address, False, q, s, B, table, columns, values, numbers[0], now, end)
                 if way != 0.0:
                     sign = way
-                for a in range(2):  # it sticks; it slips
-                    if found < MOST_EVENTS and (a == 0 or way != 0.0):
-                        event = skip(report, 4 + 4 * found)
-                        event[0] = a
-                        event[1] = now
-                        event[2] = y[0]
-                        event[3] = 0.0
-                        found += 1
-                    now = until
+                found = note(report, found, STICK, now, y[0], 0.0)
+                if way != 0.0:
+                    found = note(report, found, SLIP, until, y[0], 0.0)
+                now = until
                 h = 0.0
                 steps += 1
                 continue
@@ -247,12 +243,7 @@ def dop853(places: Any) -> None:
             y[1] = h = 0.0
             resting = True
         if falls >= 0.0:
-            found = min(found, MOST_EVENTS - 1) + 1
-            event = skip(report, 4 * found)
-            event[0] = 2
-            event[1] = now
-            event[2] = y[0]
-            event[3] = y[1]
+            found = note(report, found, SLACK, now, y[0], y[1])
             if i < count:  # a sample less than a rounding error beyond
                 out[i] = y[0]
                 out[count + i] = y[1] * per_second

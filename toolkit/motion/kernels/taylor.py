@@ -16,11 +16,12 @@ from typing import Any
 
 from numba import njit
 
+from toolkit.motion.kernels.events import SLACK, SLIP, STICK, note
 from toolkit.motion.kernels.friction import held_until, leave_rest
 from toolkit.motion.kernels.pointer import call_jet, call_slack, skip, unpack
 from toolkit.motion.kernels.sampling import sample_step
 from toolkit.motion.kernels.vector import evaluate_8
-from toolkit.motion.routes import DONE, MOST_EVENTS, NOT_FINITE, ROW, SPARE, TOO_MANY_STEPS
+from toolkit.motion.routes import DONE, NOT_FINITE, ROW, SPARE, TOO_MANY_STEPS
 
 _SAFETY = 15.0  # near the separatrix the plain estimate has been up to 13 times too small (benchmarks/integrators.py accuracy)
 
@@ -225,16 +226,9 @@ def taylor(places: Any) -> None:
                     until, way = held_until(address, True, q, s, W, R, columns, values, numbers[0], hi + lo, end)
                 if way != 0.0:
                     sign = way
-                s[3] = hi + lo
-                for a in range(2):  # it sticks; it slips
-                    if found < MOST_EVENTS and (a == 0 or way != 0.0):
-                        event = skip(report, 4 + 4 * found)
-                        event[0] = a
-                        event[1] = s[3]
-                        event[2] = s[1]
-                        event[3] = 0.0
-                        found += 1
-                    s[3] = until
+                found = note(report, found, STICK, hi + lo, s[1], 0.0)
+                if way != 0.0:
+                    found = note(report, found, SLIP, until, s[1], 0.0)
                 hi = until
                 lo = 0.0
                 steps += 1
@@ -327,12 +321,7 @@ def taylor(places: Any) -> None:
             s[2] = lost[1] = 0.0
             resting = True
         if fell >= 0.0:
-            found = min(found, MOST_EVENTS - 1) + 1
-            event = skip(report, 4 * found)
-            event[0] = 2
-            event[1] = hi + lo
-            event[2] = s[1]
-            event[3] = s[2]
+            found = note(report, found, SLACK, hi + lo, s[1], s[2])
             if i < count:  # a sample less than a rounding error beyond
                 out[i] = s[1]
                 out[count + i] = s[2] * per_second
