@@ -20,6 +20,7 @@ from toolkit.tracking.clock import even_times, lone_strays, out_of_time, place_l
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.joint import Camera, fit_jointly
 from toolkit.tracking.places import Places
+from toolkit.tracking.scatter import Factors
 from toolkit.tracking.shake import Shake
 from toolkit.tracking.string_line import seen_half
 from toolkit.tracking.verdict import poor_motion, poor_picture, require_pendulum
@@ -229,9 +230,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     )
     joint = fit_jointly(places, swing, shake, time_sigma, strings.seen(), camera)
 
-    rms_px = float(
-        np.sqrt(0.5 * np.mean((places.x_px - joint.x_px)[good] ** 2 + (places.y_px - joint.y_px)[good] ** 2))
-    )
+    rx, ry = ((p - m)[good] for p, m in ((places.x_px, joint.x_px), (places.y_px, joint.y_px)))
+    rms_px = float(np.sqrt(0.5 * np.mean(rx**2 + ry**2)))
     sx, sy = places.sigma_x_px * joint.factors.x, places.sigma_y_px * joint.factors.y
     late = time_sigma * np.hypot(*swing.velocity(places.t_s))
     typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + shake.sigma**2)[good])))
@@ -245,39 +245,18 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
 
     bridged = _bridged(good, places.t_s, swing.period_s)
     x, y = (np.where(bridged, m, p) for m, p in ((joint.x_px, places.x_px), (joint.y_px, places.y_px)))
-    spread = float(np.hypot(np.nanstd((places.x_px - joint.x_px)[good]), np.nanstd((places.y_px - joint.y_px)[good])))
+    spread = max(float(np.hypot(np.std(rx), np.std(ry))), 0.02)
     steps = np.diff(places.t_s)
     if follower.choice:
         log.append(follower.choice)
-    log += [
-        said(
-            "track.followed",
-            "The bob was followed by its {sight} with the {localiser} localiser (radius {radius_px:.2f} px, edge "
-            "{edge_px:.2f} px, exposure {exposure_ms:.1f} ms): {measured} of {frames} frames measured, {bridged} bridged by "
-            "the fitted motion.",
-            sight=said(f"track.by_{follower.sight.name}", follower.sight.name),
-            localiser=follower.localiser.name,
-            radius_px=float(look.radius_px),
-            edge_px=float(look.edge_px),
-            exposure_ms=1e3 * follower.exposure_s / fps_factor,
-            measured=int(good.sum()),
-            frames=int(good.size),
-            bridged=int(bridged.sum()),
-        ),
-        said(
-            "track.error_bars",
-            "The error bars of the fit were multiplied by {x:.2f} (x) and {y:.2f} (y), the scatter seen about a smooth motion.",
-            x=joint.factors.x,
-            y=joint.factors.y,
-        ),
-    ]
+    log += _how_followed(follower, good, bridged, joint.factors, fps_factor)
     return Track(
         frame=np.array(record.index),
         t_s=places.t_s / fps_factor,
         x_px=x + shake.x,
         y_px=y + shake.y,
-        sigma_x_px=np.where(bridged, max(spread, 0.02), sx),
-        sigma_y_px=np.where(bridged, max(spread, 0.02), sy),
+        sigma_x_px=np.where(bridged, spread, sx),
+        sigma_y_px=np.where(bridged, spread, sy),
         status=np.where(good, OK, np.where(bridged, PREDICTED, LOST)),
         radius_px=float(look.radius_px),
         pivot_px=pivot or (joint.view or swing).pivot_px,
@@ -314,6 +293,35 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             "warnings": [*video.warnings, *warnings],
         },
     )
+
+
+def _how_followed(
+    follower: Follower, good: np.ndarray, bridged: np.ndarray, factors: Factors, fps_factor: float
+) -> list[str]:
+    """Sentences on how the bob was followed and what became of its error bars."""
+    look = follower.look
+    return [
+        said(
+            "track.followed",
+            "The bob was followed by its {sight} with the {localiser} localiser (radius {radius_px:.2f} px, edge "
+            "{edge_px:.2f} px, exposure {exposure_ms:.1f} ms): {measured} of {frames} frames measured, {bridged} bridged by "
+            "the fitted motion.",
+            sight=said(f"track.by_{follower.sight.name}", follower.sight.name),
+            localiser=follower.localiser.name,
+            radius_px=float(look.radius_px),
+            edge_px=float(look.edge_px),
+            exposure_ms=1e3 * follower.exposure_s / fps_factor,
+            measured=int(good.sum()),
+            frames=int(good.size),
+            bridged=int(bridged.sum()),
+        ),
+        said(
+            "track.error_bars",
+            "The error bars of the fit were multiplied by {x:.2f} (x) and {y:.2f} (y), the scatter seen about a smooth motion.",
+            x=factors.x,
+            y=factors.y,
+        ),
+    ]
 
 
 def _require_seen(places: Places, video: Video) -> None:
