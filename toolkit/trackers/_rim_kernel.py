@@ -19,9 +19,10 @@ from toolkit.trackers._disc_kernel import loop
     PROFILE, RUNS, LEVELS, CHANCES, COUNTED, ROOM, COSTS, LEAST,
     RAY_COUNT, RUN_COUNT, LEVEL_COUNT, PLACE_COUNT, SHELL_COUNT, ALIKE,
 ) = range(14)  # fmt: skip
-# A run: its first ray and the one behind its last, its first sample and how many it has, then the addresses of its model's
-# four arrays (see `edge._Model`).
-FIRST_RAY, LAST_RAY, FIRST_SAMPLE, SAMPLES, WHITEN, WITHIN, SHELL, VOLUME, RUN = range(9)
+# A run: its first ray and the one behind its last, its first sample and how many it has, how many of the shells it may have,
+# then the addresses of its model's four arrays (see `edge._Model`).
+FIRST_RAY, LAST_RAY, FIRST_SAMPLE, SAMPLES, SHELLS, WHITEN, WITHIN, SHELL, VOLUME, RUN = range(10)
+_NEVER = 1e6  # the misfit of a shell that a run cannot have
 
 
 @loop
@@ -94,7 +95,15 @@ def weigh_places(places: Any) -> None:
         whiten, within = pixels(run, WHITEN), pixels(run, WITHIN)
         shell, volume = pixels(run, SHELL), pixels(run, VOLUME)
         mine = skip(profile, run[FIRST_SAMPLE] * rays + begin)
-        for m in range(kinds):
+        for kind in range(kinds):
+            place, d = kind // shells, kind % shells
+            if d >= run[SHELLS]:
+                for q in range(level_count):
+                    out = skip(misfit, (q * kinds + kind) * rays + begin)
+                    for r in range(n):
+                        out[r] = _NEVER
+                continue
+            m = place * run[SHELLS] + d
             own = volume[m] - volume[m]
             for r in range(n):
                 square[r] = volume[m]
@@ -105,7 +114,7 @@ def weigh_places(places: Any) -> None:
                 collect(row, n, mean * within[at], shell[at], square, along)
                 own += shell[at] * shell[at]
             for q in range(level_count):
-                out = skip(misfit, (q * kinds + m) * rays + begin)
+                out = skip(misfit, (q * kinds + kind) * rays + begin)
                 offer(square, along, own, levels[q], skip(counted, begin), n, out, skip(least, begin))
     for s in range(tried):
         for r in range(rays):

@@ -31,11 +31,12 @@ _ALIKE = 3  # neighbouring rays that see the same shell
 _TIED = 7.0  # rays that err alike, where the shell is not quite as any that is tried
 _FAR = 9.0  # what a ray may disagree by, in units of twice the log-likelihood, before it counts less
 _STRAY = 100.0  # the same, before it counts less for which shell its neighbours see
+_SEEN_THROUGH = 1  # px of blur along a ray, beyond which no shell is told from the rest
 _BLURS = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48])  # px along a ray
 # standard deviations, all but the last two in units of the contrast:
 _WITHIN = 0.5  # of the level within the shell
 _SHELL = 0.06  # of the shell's level about one of those seen
-_CHANGE = 0.05  # of the level from one depth to the next
+_CHANGE, _CHANGE_BLURRED = 0.05, 0.3  # of the level from one depth to the next, with shells and without
 _OUTSIDE = 0.1  # of the level beyond the outline (a shadow)
 _FLOOR = 0.03  # of what a codec and the edge's true shape leave
 _SOFT = 0.5  # px, of the shell's inner edge
@@ -139,16 +140,17 @@ def _model(edge: float, blur: int, noise: float) -> _Model:
 
     r = _grid(edge, blur)
     ends = np.linspace(-0.5, 0.5, 1 + 2 * blur) * blur
+    depths, change = (_SHELLS, _CHANGE) if blur <= _SEEN_THROUGH else (_SHELLS[:0], _CHANGE_BLURRED)
 
     def covered(rims: np.ndarray, sigma: float) -> np.ndarray:
         return np.asarray(ndtr((rims[..., None, None] + ends - r[:, None]) / sigma).mean(axis=-1))
 
-    shift, depth = np.repeat(_SHIFTS, 1 + _SHELLS.size), np.tile([-np.inf, *_SHELLS], _SHIFTS.size)
-    sharp = np.tile([False, *(np.arange(_SHELLS.size) < _SHARP.size)], _SHIFTS.size)[:, None]
+    shift, depth = np.repeat(_SHIFTS, 1 + depths.size), np.tile([-np.inf, *depths], _SHIFTS.size)
+    sharp = np.tile([False, *(np.arange(depths.size) < _SHARP.size)], _SHIFTS.size)[:, None]
     disc = covered(shift, edge)
     core = np.where(sharp, disc * covered(shift - depth, _SOFT), covered(shift - depth, edge))
     within, shell = core, disc - core
-    changes = [_CHANGE * core * covered(shift - d, edge) for d in _WALK]
+    changes = [change * core * covered(shift - d, edge) for d in _WALK]
     random = np.stack([_WITHIN * within, _SHELL * shell, _OUTSIDE * (1 - disc), *changes], axis=-1)
     spread = random @ random.transpose(0, 2, 1) + noise**2 * 0.5 ** (np.abs(r[:, None] - r) / 0.5)
     spread[:, r < -_DEEP, r < -_DEEP] += 1.0
@@ -179,7 +181,8 @@ def _weigh(
     for begin, end in pairwise(ends.tolist()):
         model = _model(edge, int(blurs[begin]), noise)
         size = model.within.shape[1]
-        runs.append((begin, end, round((model.first_px - r[0]) / _STEP), size, *(address(a) for a in model[:4])))
+        first, shells = round((model.first_px - r[0]) / _STEP), len(model.volume) // _SHIFTS.size
+        runs.append((begin, end, first, size, shells, *(address(a) for a in model[:4])))
     arrays = (
         np.ascontiguousarray(profile.T),
         np.array(runs, np.int64),
