@@ -304,6 +304,10 @@ class Follower(Known):
         """Where the bob should be on the frame, and its streak."""
         x, y, vx, vy = self._expect(frame.t_s)
         self._speed = hypot(vx, vy)
+        if not self._speed * self.interval_s < max(
+            self.shape
+        ):  # the motion ran away: no bob crosses the picture in a frame
+            self._speed = vx = vy = 0.0
         return self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
 
     def _expect(self, t: float) -> tuple[float, float, float, float]:
