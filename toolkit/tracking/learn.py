@@ -23,13 +23,18 @@ _CHECK_EVERY = 12
 
 
 class Trial(NamedTuple):
-    """A localiser on the frames read ahead: the motion fitted to its places, and what misfit and how much of the outline (at
-    two speeds) are ordinary for it."""
+    """A localiser on the frames read ahead: on how many it finds the bob, the motion fitted to its places, and what misfit and
+    how much of the outline (at two speeds) are ordinary for it."""
 
     localiser: Localiser
+    found: int
     swing: Swing
     misfit: float
     visible: tuple[tuple[float, float], tuple[float, float]]
+
+    def finds_more_than(self, other: Trial) -> bool:
+        """Does it find the bob on more frames, and no less calmly?"""
+        return self.found > 1.03 * other.found and self.swing.rms_px <= other.swing.rms_px
 
 
 class Known:
@@ -196,7 +201,7 @@ class Known:
         calm = 2.0 * min(t.swing.rms_px for t in tried) + 0.05  # whatever it explains, what leaps about was not found
         # a model with more freedom leaves less of any picture
         best = min(
-            (t for t in tried if t.swing.rms_px < calm),
+            (t for t in tried if t.swing.rms_px < calm and not any(other.finds_more_than(t) for other in tried)),
             key=lambda t: t.misfit * (0.7 if t.localiser.name == "disc" else 1.0),
         )
         self.swing, self.ordinary_misfit, self.ordinary_visible = best.swing, best.misfit, best.visible
@@ -227,7 +232,9 @@ class Known:
         if clear.sum() < 10:
             clear[:] = True
         speeds = np.hypot(*swing.velocity(t))
-        return Trial(localiser, swing, float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear]))
+        return Trial(
+            localiser, len(places), swing, float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear])
+        )
 
     # --- geometry -------------------------------------------------------------------------------------------------
 
