@@ -140,11 +140,11 @@ def place_lost_frames(places: Places, swing: Swing, warnings: list[str]) -> tupl
 def lone_strays(places: Places, swing: Swing, log: list[str]) -> np.ndarray:
     """Frames (n,) bool on which the bob was found far from where the motion and the frames about it have it: a picture shown
     again, a post or a passer-by taken for it. None where they are so many that something else is amiss."""
-    off = []
-    for p, m in zip((places.x_px, places.y_px), swing.position(places.t_s)):
-        r = p - m - _running_median(p - m, places.good)
-        off.append(np.abs(r) / (1.4826 * np.median(np.abs(r[places.good])) + _LEAST_PX / _STRAY))
-    stray = places.good & (np.hypot(*off) > _STRAY)
+    rest = np.array([places.x_px, places.y_px]) - swing.position(places.t_s)
+    apart = rest - [_running_median(r, places.good) for r in rest]
+    usual = 1.4826 * np.median(np.abs(apart[:, places.good]), axis=1, keepdims=True) + _LEAST_PX / _STRAY
+    stray = places.good & (np.hypot(*apart / usual) > _STRAY)
+    stray[stray] = ~_lead_on(rest / usual, places.good & ~stray, np.flatnonzero(stray))
     if not 0 < stray.sum() < _LEFT_OUT * stray.size:
         return np.zeros(stray.size, bool)
     log.append(
@@ -229,3 +229,16 @@ def _running_median(values: np.ndarray, good: np.ndarray, half: int = 7) -> np.n
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
     filled = np.where(np.all(np.isnan(windows), axis=1)[:, None], 0.0, windows)
     return np.nanmedian(filled, axis=1)
+
+
+def _lead_on(values: np.ndarray, steady: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Do the three steady frames before a chosen one, or those behind it, lead to it in a line? (chosen,) bool; `values` are
+    (2, n) in units of their scatter. Then it is theirs, at the brink of a leap."""
+    led = np.zeros(chosen.size, bool)
+    some = np.flatnonzero(steady)
+    for n, k in enumerate(chosen):
+        for side in (some[some < k][-3:], some[some > k][:3]):
+            if side.size == 3 and np.abs(side - k).max() <= 7:
+                at = np.polyfit(side - k, values[:, side].T, 1)[1]
+                led[n] |= np.hypot(*(values[:, k] - at)) < _STRAY
+    return led
