@@ -144,9 +144,11 @@ def lone_strays(places: Places, swing: Swing, log: list[str]) -> np.ndarray:
     apart = rest - [_running_median(r, places.good) for r in rest]
     usual = 1.4826 * np.median(np.abs(apart[:, places.good]), axis=1, keepdims=True) + _LEAST_PX / _STRAY
     stray = places.good & (np.hypot(*apart / usual) > _STRAY)
-    stray[stray] = ~_lead_on(rest / usual, places.good & ~stray, np.flatnonzero(stray))
-    if not 0 < stray.sum() < _LEFT_OUT * stray.size:
+    if stray.sum() >= _LEFT_OUT * stray.size:
         return np.zeros(stray.size, bool)
+    stray[stray] = ~_lead_on(rest / usual, places.good & ~stray, np.flatnonzero(stray))
+    if not stray.any():
+        return stray
     log.append(
         said(
             "track.lone_strays",
