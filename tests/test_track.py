@@ -220,12 +220,12 @@ def test_what_passes_by_is_no_slow_swing_and_a_swing_is_one():
     from types import SimpleNamespace
 
     from toolkit.trackers.localiser import Look
-    from toolkit.tracking.acquire import _swing_of
+    from toolkit.tracking.trail import swing_through
 
     t, noise = np.arange(96) / FPS, np.random.default_rng(3).normal(0, 0.1, (2, 96))
     batch = [SimpleNamespace(t_s=float(s)) for s in t]
     rolling = 20 + 120 * t + noise[0], 60 + 5 * t + noise[1]
     swinging = PIVOT[0] + LENGTH * np.sin(angles(t)) + noise[0], PIVOT[1] + LENGTH * np.cos(angles(t)) + noise[1]
-    assert _swing_of(batch, dict(enumerate(zip(*rolling))), Look(11.0)) is None
-    found = _swing_of(batch, dict(enumerate(zip(*swinging))), Look(11.0))
+    assert swing_through(batch, dict(enumerate(zip(*rolling))), Look(11.0)) is None
+    found = swing_through(batch, dict(enumerate(zip(*swinging))), Look(11.0))
     assert found.period_s == pytest.approx(2 * np.pi / OMEGA, rel=0.02)

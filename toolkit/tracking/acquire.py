@@ -6,56 +6,25 @@ the still picture that the frames themselves show, and by its silhouette (a bob 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from toolkit.errors import JobError, UsageError
-from toolkit.trackers.disc import fit_disc
-from toolkit.trackers.localiser import Guess, Look, Patch
+from toolkit.trackers.localiser import Look
 from toolkit.tracking.search import (
     Hypothesis,
     even_light,
     find_round_movers,
-    find_round_near,
-    rim_level,
     shrink,
     silhouette,
     still_picture,
 )
 from toolkit.tracking.sight import LUMA, Sight, best_sight, small_planes
-from toolkit.tracking.swing import Swing, fit_swing, start_swing
+from toolkit.tracking.trail import Rough, Stage, Trail, begin_trail, cut
 from toolkit.video import Frame
 
 _FOLLOWED = 8  # hypotheses at most
 _MOST = 0.9  # of the frames: a bob seen on fewer is looked for in other ways too
 REMEDY = "give --bob X,Y (its centre in px on the first frame)"
-
-
-@dataclass(frozen=True)
-class Rough:
-    """A hypothesis that was followed: the bob's looks, its motion, centre by index of the frame, and a score."""
-
-    look: Look
-    swing: Swing
-    points: dict[int, tuple[float, float]]
-    score: float
-    sight: Sight
-
-
-class Trail(NamedTuple):
-    """Where something of this radius was seen, by the index of the frame."""
-
-    radius_px: float
-    points: dict[int, tuple[float, float]]
-
-
-class Stage(NamedTuple):
-    """The still picture that hypotheses are followed before; with `silhouette` all that differs from it looks alike."""
-
-    still: np.ndarray
-    silhouette: bool
 
 
 def _repeats(batch: list[Frame]) -> frozenset[int]:
@@ -111,9 +80,13 @@ def _likeliest(
         start = samples[h.sample]
         if len(trails) == _FOLLOWED:
             break
-        if any(_same(trail, h, start) for trail in trails):
+        if any(trail.holds(h, start) for trail in trails):
             continue
-        rough = _follow(batch, start, h, sight, radius, repeated, stage, trails)
+        trail = begin_trail(batch, start, h, sight, radius, repeated, stage)
+        if trail is None:
+            continue
+        trails.append(trail)
+        rough = trail.follow(radius)
         if rough is not None and (best is None or rough.score > best.score):
             best = rough
     return best
@@ -189,159 +162,6 @@ def _hypotheses(
     return found, samples
 
 
-def _same(trail: Trail, h: Hypothesis, start: int) -> bool:
-    """Is the hypothesis on the thing that was followed already?"""
-    place = trail.points.get(start)
-    return (
-        place is not None
-        and bool(np.hypot(place[0] - h.x_px, place[1] - h.y_px) < 0.7 * trail.radius_px)
-        and h.radius_px < 1.5 * trail.radius_px
-    )
-
-
-def _follow(
-    batch: list[Frame],
-    start: int,
-    h: Hypothesis,
-    sight: Sight,
-    radius: float | None,
-    repeated: frozenset[int] = frozenset(),
-    stage: Stage | None = None,
-    trails: list[Trail] | None = None,
-) -> Rough | None:
-    """Follow a hypothesis through the batch, against a wall of one level or on a stage; None unless it swings.
-
-    Where it was seen is added to `trails`, whether it swings or not.
-    """
-
-    def fit_at(i: int, look: Look, guess: Guess, free: bool = False) -> tuple[float, float, Look] | None:
-        return rough_fit(batch[i], sight, look, guess, stage, free)
-
-    outlined = stage is not None and stage.silhouette
-    first = fit_at(start, Look(h.radius_px, max(0.8, 0.12 * h.radius_px)), Guess(h.x_px, h.y_px), free=True)
-    if first is None:
-        return None
-    x, y, look = first
-    if not (radius or 0.4 < look.radius_px / h.radius_px < 2.2):
-        return None
-    points = {start: (x, y)}
-    looks = [look]
-    if trails is not None:
-        trails.append(Trail(look.radius_px, points))
-
-    def by_silhouette(i: int, guess: Guess) -> tuple[float, float, Look] | None:
-        patch = _on_stage(batch[i], sight, guess.x_px, guess.y_px, 2.2 * look.radius_px + 6, stage)
-        found = None if patch is None else find_round_near(patch.image, look.radius_px, 1, look.edge_px)
-        if patch is None or found is None or found[2] < 0.5:
-            return None
-        return found[0] + patch.x_px, found[1] + patch.y_px, look
-
-    def take(i: int, guess: Guess) -> bool:
-        fit = by_silhouette(i, guess) if outlined else fit_at(i, look, guess)
-        if not outlined:  # where a wide look does not settle (a highlight on a streaked bob) a close one may
-            fit = fit_at(i, look, guess if fit is None else Guess(fit[0], fit[1]), free=True)
-        if fit is None or not 0.7 < fit[2].radius_px / look.radius_px < 1.4:
-            return False
-        if not 0.4 < fit[2].contrast / look.contrast < 2.0:
-            return False
-        if np.hypot(fit[0] - guess.x_px, fit[1] - guess.y_px) > 0.8 * look.radius_px + 3:
-            return False
-        points[i] = fit[:2]
-        looks.append(fit[2])
-        return True
-
-    def look_around(i: int, x: float, y: float, step: float) -> bool:
-        """Not where it should be: the outline of its size that gathers most votes within some diameters and `step`s."""
-        patch = _on_stage(batch[i], sight, x, y, 5.5 * look.radius_px + 4 + 2 * step, stage)
-        if patch is None:
-            return False
-        found = find_round_near(patch.image - patch.back, look.radius_px, 1 if look.contrast > 0 else -1, look.edge_px)
-        if found is None or found[2] < 0.5:
-            return False
-        return take(i, Guess(found[0] + patch.x_px, found[1] + patch.y_px))
-
-    for way in (1, -1):
-        recent = [(batch[start].t_s, x, y)]
-        misses = 0
-        i = start + way
-        while 0 <= i < len(batch) and misses < 4:
-            if i in repeated:
-                i += way
-                continue
-            ahead = extrapolate(recent, batch[i].t_s)
-            speed = np.hypot(recent[-1][1] - recent[-2][1], recent[-1][2] - recent[-2][2]) if recent[1:] else 0.0
-            if take(i, Guess(*ahead)) or look_around(i, *recent[-1][1:], min(float(speed), 4 * look.radius_px)):
-                recent = [*recent, (batch[i].t_s, *points[i])][-3:]
-                misses = 0
-            else:
-                misses += 1
-            i += way
-    swing = _swing_of(batch, points, look)
-    tried: set[int] = set()
-    while swing is not None and len(points) < len(batch):  # what lies behind a gap: where the motion says
-        left = [i for i in range(len(batch)) if i not in points and i not in tried and i not in repeated]
-        if not left:
-            break
-        near = [i for i in left if min(abs(i - p) for p in points) <= 24] or left[:1]
-        where = swing.position(np.array([batch[i].t_s for i in near]))
-        before = len(points)
-        for i, gx, gy in zip(near, *where):
-            tried.add(i)
-            take(i, Guess(float(gx), float(gy)))
-        if len(points) > before:
-            swing = _swing_of(batch, points, look)
-    if swing is None or len(points) < max(12, 0.3 * len(batch)):
-        return None
-    size, edge, contrast, noise = (float(np.median([k[n] for k in looks])) for n in range(4))
-    look = Look(size, edge, contrast, noise)
-    if radius:
-        look = look._replace(radius_px=radius)
-    quality = abs(contrast) / (noise + 1.0)
-    extent = float(np.hypot(*np.ptp(list(points.values()), axis=0)))
-    moved = min(1.0, 0.25 * extent / look.radius_px)  # what stands still on a wall that shakes explains little change
-    score = (len(points) / len(batch)) ** 2 * quality * moved * look.radius_px**0.5 / (0.3 + swing.rms_px)
-    if stage is not None and stage.silhouette:
-        look = look._replace(contrast=_contrast(batch, points, look.radius_px, stage.still))
-    return Rough(look, swing, {i: points[i] for i in sorted(points)}, score, sight)
-
-
-def _contrast(batch: list[Frame], points: dict[int, tuple[float, float]], radius_px: float, still: np.ndarray) -> float:
-    """Bob less still picture, by the larger half of what differs well within the outline."""
-    found = []
-    for i in list(points)[:: max(1, len(points) // 12)]:
-        x, y = (round(v) for v in points[i])
-        r = max(1, int(0.6 * radius_px))
-        window = (slice(max(0, y - r), y + r + 1), slice(max(0, x - r), x + r + 1))
-        found.append((batch[i].luma[window].astype(float) - still[window]).ravel())
-    values = np.concatenate(found)
-    return float(np.mean(values[np.abs(values) >= np.median(np.abs(values))]))
-
-
-def _swing_of(batch: list[Frame], points: dict[int, tuple[float, float]], look: Look) -> Swing | None:
-    """The pendulum motion through the points; None where they do not move like one."""
-    if len(points) < 10:
-        return None
-    order = sorted(points)
-    t = np.array([batch[i].t_s for i in order])
-    x, y = np.array([points[i] for i in order]).T
-    extent = float(np.hypot(np.ptp(x), np.ptp(y)))
-    if extent < max(1.0, 0.05 * look.radius_px):
-        return None  # it does not move
-    start = start_swing(t, x, y)
-    swing = None if start is None else fit_swing(t, x, y, np.full(t.size, 0.3), start)
-    # a hand-held camera adds its own wandering: what is left when that is taken away is judged later
-    wandering = 0.12 if len(points) > 0.9 * len(batch) else 0.05
-    if swing is None or swing.rms_px > max(wandering * extent, 0.5):
-        return None
-    if swing.values[4] > 0 and swing.period_s < 5 * float(np.median(np.diff(t))):
-        return None  # faster than these pictures could show
-    line = np.column_stack([np.ones(t.size), t - t[0]])
-    straight = np.column_stack([x, y]) - line @ np.linalg.lstsq(line, np.column_stack([x, y]), rcond=None)[0]
-    if np.sqrt(np.mean(np.sum(straight**2, axis=1))) < 1.5 * swing.rms_px + 0.02 * extent:
-        return None  # it passes by; what swings that slowly is found in more of the clip
-    return swing
-
-
 def _in_best_sight(batch: list[Frame], rough: Rough, radius: float | None, repeated: frozenset[int]) -> Rough:
     """The same thing, looked at in the mix of planes in which it stands out best."""
     some = list(rough.points)[:: max(1, len(rough.points) // 8)]
@@ -350,69 +170,6 @@ def _in_best_sight(batch: list[Frame], rough: Rough, radius: float | None, repea
         return rough
     start = some[len(some) // 2]
     h = Hypothesis(0, *rough.points[start], rough.look.radius_px, 0, 1.0)
-    other = _follow(batch, start, h, sight, radius, repeated)
+    trail = begin_trail(batch, start, h, sight, radius, repeated)
+    other = None if trail is None else trail.follow(radius)
     return other if other is not None and other.score > rough.score else rough
-
-
-def rough_fit(
-    frame: Frame, sight: Sight, look: Look, guess: Guess, stage: Stage | None = None, free: bool = False
-) -> tuple[float, float, Look] | None:
-    """Disc fit against a wall of one level, the median of the patch's rim, or on a stage: (x, y, looks) or None.
-
-    `free`: radius and edge are fitted too; else the edge is widened, to find the bob from far away.
-    """
-    patch = _on_stage(frame, sight, guess.x_px, guess.y_px, 1.6 * look.radius_px + 6, stage)
-    if patch is None:
-        return None
-    how: dict[str, Any] = {"calibrate": True, "turns": 8} if free else {"soften": 2.5, "turns": 12}
-    if free and look.contrast == 0.0:
-        how = {"calibrate": True, "turns": 12, "soften": 2.0}
-    out = fit_disc(patch, look._replace(noise=np.inf), guess, **how)
-    if out is None or abs(out[9]) < 4:
-        return None
-    return out[0] + patch.x_px, out[1] + patch.y_px, Look(out[2], out[3], out[9], out[7])
-
-
-def _on_stage(frame: Frame, sight: Sight, x: float, y: float, half: float, stage: Stage | None) -> Patch | None:
-    """The patch with what is thought to stand behind the bob."""
-    patch = cut(frame, sight, x, y, half)
-    if patch is None:
-        return None
-    rows, columns = patch.image.shape
-    if stage is None:
-        level = max(rim_level(patch.image), 1.0)
-        return patch._replace(back=np.full_like(patch.image, level), seen=np.zeros_like(patch.image))
-    x0, y0 = int(patch.x_px), int(patch.y_px)
-    back = stage.still[y0 : y0 + rows, x0 : x0 + columns].astype(np.float32)
-    if stage.silhouette:
-        image = 1.0 + silhouette(patch.image, back)  # the fit's gain needs a wall that is not black
-        return patch._replace(image=image, back=np.ones_like(back), seen=np.zeros_like(back))
-    return patch._replace(back=back, seen=np.full_like(back, 3.0))
-
-
-def cut(frame: Frame, sight: Sight, x: float, y: float, half: float, half_y: float | None = None) -> Patch | None:
-    """The patch of ±half px about (x, y), as far as it lies in the picture (`back` and `seen` are yet to be set)."""
-    if half_y is None:
-        half_y = half
-    if not np.isfinite(x + y + half + half_y):
-        return None
-    height, width = frame.luma.shape
-    x0, x1 = max(0, int(x - half)), min(width, int(x + half) + 2)
-    y0, y1 = max(0, int(y - half_y)), min(height, int(y + half_y) + 2)
-    if x1 - x0 < 6 or y1 - y0 < 6:
-        return None
-    image = sight.window(frame, x0, y0, x1, y1)
-    return Patch(image, image, image, x0, y0)
-
-
-def extrapolate(recent: list[tuple[float, float, float]], t: float) -> tuple[float, float]:
-    """Through the last one, two or three points (t, x, y), to time t (Lagrange)."""
-    x = y = 0.0
-    for i, (ti, xi, yi) in enumerate(recent):
-        weight = 1.0
-        for j, (tj, _, _) in enumerate(recent):
-            if i != j:
-                weight *= (t - tj) / (ti - tj) if ti != tj else 0.0
-        x += weight * xi
-        y += weight * yi
-    return x, y

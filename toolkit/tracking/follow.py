@@ -10,13 +10,13 @@ import numpy as np
 
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
-from toolkit.tracking.acquire import Rough
 from toolkit.tracking.learn import Known, restarted
 from toolkit.tracking.looks import light_on
 from toolkit.tracking.search import find_round_near, silhouette
 from toolkit.tracking.stillness import CameraShift
 from toolkit.tracking.string_line import measure_string
 from toolkit.tracking.swing import fit_swing
+from toolkit.tracking.trail import Rough
 from toolkit.video import Frame
 
 _STRING_EVERY = 3

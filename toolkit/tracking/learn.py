@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker, tracker_names
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
-from toolkit.tracking.acquire import Rough, cut, is_even, scattered
+from toolkit.tracking.acquire import is_even, scattered
 from toolkit.tracking.background import Background
 from toolkit.tracking.looks import Looks, Sightings, learn_looks
 from toolkit.tracking.search import still_picture
@@ -17,6 +17,7 @@ from toolkit.tracking.shadow import Shaded, Shadow, find_shadow
 from toolkit.tracking.sight import LUMA
 from toolkit.tracking.stillness import STILL, Anchors, CameraShift
 from toolkit.tracking.swing import Swing, fit_swing
+from toolkit.tracking.trail import Rough, cut
 from toolkit.video import Frame
 
 _CHECK_EVERY = 12
