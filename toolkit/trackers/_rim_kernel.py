@@ -16,9 +16,9 @@ from toolkit.trackers._disc_kernel import loop
 # rays count (0 or 1), of room for a number a level, place, shell and ray and a few lists of rays more, of the costs
 # (rays, places) and of each ray's least misfit; then how many there are of each. All are float32 but runs and costs.
 (
-    PROFILE, RUNS, LEVELS, CHANCES, COUNTED, ROOM, COSTS, LEAST,
+    PROFILE, RUNS, LEVELS, CHANCES, COUNTED, ORDER, ROOM, COSTS, LEAST,
     RAY_COUNT, RUN_COUNT, LEVEL_COUNT, PLACE_COUNT, SHELL_COUNT, ALIKE,
-) = range(14)  # fmt: skip
+) = range(15)  # fmt: skip
 # A run: its first ray and the one behind its last, its first sample and how many it has, how many of the shells it may have,
 # then the addresses of its model's four arrays (see `edge._Model`).
 FIRST_RAY, LAST_RAY, FIRST_SAMPLE, SAMPLES, SHELLS, WHITEN, WITHIN, SHELL, VOLUME, RUN = range(10)
@@ -56,12 +56,16 @@ def offer(square: Any, along: Any, own: Any, level: Any, counted: Any, n: int, m
 
 
 @loop
-def share(misfit: Any, least: Any, n: int, alike: int, stray: Any, row: Any, chance: Any, best: Any) -> None:
+def share(
+    misfit: Any, least: Any, order: Any, n: int, alike: int, stray: Any, row: Any, chance: Any, best: Any
+) -> None:
     """Sum the misfits of neighbours, each worth `stray` at most, and keep the least sum."""
     half = alike // 2
     for r in range(n):
         off = misfit[r] - least[r]
-        row[half + r] = off * stray / (stray + off)
+        misfit[r] = off * stray / (stray + off)
+    for r in range(n):
+        row[half + order[r]] = misfit[r]
     for k in range(half):
         row[k] = row[n + k]
         row[half + n + k] = row[half + k]
@@ -79,7 +83,7 @@ def weigh_places(places: Any) -> None:
     """Minus twice the log-likelihood of each place of the outline on each ray, by the best shell for it and its neighbours."""
     profile, runs, levels = pixels(places, PROFILE), wholes(places, RUNS), pixels(places, LEVELS)
     chances, counted, costs = pixels(places, CHANCES), pixels(places, COUNTED), reals(places, COSTS)
-    misfit, least = pixels(places, ROOM), pixels(places, LEAST)
+    order, misfit, least = wholes(places, ORDER), pixels(places, ROOM), pixels(places, LEAST)
     rays, level_count, shells, tried = places[RAY_COUNT], places[LEVEL_COUNT], places[SHELL_COUNT], places[PLACE_COUNT]
     kinds = tried * shells
     row = skip(misfit, level_count * kinds * rays)  # and ALIKE more, for the first rays are the last ones' neighbours
@@ -122,7 +126,7 @@ def weigh_places(places: Any) -> None:
         for q in range(level_count):
             for d in range(shells):
                 kind = (q * tried + s) * shells + d
-                share(skip(misfit, kind * rays), least, rays, places[ALIKE], stray, row, chances[d], best)
+                share(skip(misfit, kind * rays), least, order, rays, places[ALIKE], stray, row, chances[d], best)
         for r in range(rays):
             costs[r * tried + s] = best[r] / places[ALIKE]
     for r in range(rays):

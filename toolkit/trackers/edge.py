@@ -19,12 +19,12 @@ import numpy as np
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 
 _STEP = 0.5  # px between samples of a ray
-_SHIFTS = np.linspace(-1.8, 1.8, 25)  # places of the outline on a ray that are tried, px
+_SHIFTS = np.linspace(-1.2, 1.2, 17)  # places of the outline on a ray that are tried, px
 _SHARP = np.array([-0.15, 0.15, 0.45, 0.8, 1.2])  # px: how deep a shell is tried that is as sharp as a pixel,
 _SHELLS = np.array([*_SHARP, *np.arange(0.2, 3.3, 0.3)])  # and one as blurred as the outline
 _DEEP = 3.0  # px within the outline: what lies deeper hardly counts
 _WALK = np.array([0.4, 0.9, 1.6, 2.6])  # depths at which the level within may change a little, px
-_LEVELS = 0.03, 0.3, 0.7, 0.97  # quantiles of what is seen on the bob: levels that the shell may have
+_LEVELS = np.array([0.03, 0.3, 0.7, 0.97])  # quantiles of what is seen on the bob: levels that the shell may have
 _SHELLED = 0.3  # how likely there is a shell at all
 _CHANCES = -2 * np.log(np.array([1 - _SHELLED, *np.full(_SHELLS.size, _SHELLED / _SHELLS.size)])).astype(np.float32)
 _ALIKE = 3  # neighbouring rays that see the same shell
@@ -33,6 +33,9 @@ _FAR = 9.0  # what a ray may disagree by, in units of twice the log-likelihood, 
 _STRAY = 100.0  # the same, before it counts less for which shell its neighbours see
 _SEEN_THROUGH = 1  # px of blur along a ray, beyond which no shell is told from the rest
 _BLURS = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48])  # px along a ray
+_BETWEEN = 0.5 * (_BLURS[1:] + _BLURS[:-1])
+_SETTLED = 0.3  # px: after a smaller step the rays, taken from before it, would hardly differ
+_POOR = 0.9  # px: after a larger first step the guess was poor
 # standard deviations, all but the last two in units of the contrast:
 _WITHIN = 0.5  # of the level within the shell
 _SHELL = 0.06  # of the shell's level about one of those seen
@@ -56,9 +59,11 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
     contrast = look.contrast or float(np.ptp(patch.image - patch.back))
     if not abs(contrast) > 0:
         return None
+    rows, columns = patch.image.shape
     centre = np.array([guess.x_px - patch.x_px, guess.y_px - patch.y_px], float)
     picture = np.ascontiguousarray((patch.image - patch.back) / contrast, np.float32)
-    quiet = 1.4826 * float(np.median(np.abs(picture - np.median(picture))))
+    some = picture[::2, ::2]
+    quiet = 1.4826 * float(np.median(np.abs(some - np.median(some))))
     noise = float(2.0 ** np.round(np.log2(np.clip(quiet, _FLOOR, 0.2))))
     count = int(max(32, 2 * np.pi * look.radius_px / 0.9))
     angles = (np.arange(count) + 0.5) * 2 * np.pi / count
@@ -68,23 +73,20 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
     ux, uy = np.cos(angles), np.sin(angles)
     streak = np.abs(guess.streak_x_px * ux + guess.streak_y_px * uy)
     wide = max(1.0, look.radius_px / 6)
-    unit, step = wide, 0.0  # coarse at first: what is drawn is mistaken for the outline less, and the reach is far
-    for turn in range(10):
-        if turn > 1 or (turn and step < 0.5):
-            unit = 1.0
+    unit = 1.0
+    for turn in range(6):
         edge = float(round(max(look.edge_px / unit, 0.3), 1))
-        blurs = _BLURS[np.abs(streak[:, None] / unit - _BLURS).argmin(axis=1)]
+        blurs = _BLURS[np.searchsorted(_BETWEEN, streak / unit)]
         r = _grid(edge, int(blurs.max()))
-        x = centre[0] + ux[:, None] * (look.radius_px + unit * r)
-        y = centre[1] + uy[:, None] * (look.radius_px + unit * r)
-        inside = ((x >= 0) & (y >= 0) & (x <= picture.shape[1] - 1) & (y <= picture.shape[0] - 1))[
-            :, r < 2.5 * edge + 0.5
-        ].all(axis=1)
+        far = (look.radius_px + unit * r).astype(np.float32)
+        x, y = (np.float32(c) + u.astype(np.float32)[:, None] * far for c, u in zip(centre, (ux, uy)))
+        last = (
+            int(np.searchsorted(r, 2.5 * edge + 0.5)) - 1
+        )  # a ray counts if the picture, which is convex, has that sample
+        inside = (x[:, last] >= 0) & (x[:, last] <= columns - 1) & (y[:, last] >= 0) & (y[:, last] <= rows - 1)
         if inside.sum() < 12:
             return None
-        profile = cv2.remap(
-            picture, x.astype(np.float32), y.astype(np.float32), cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
-        )
+        profile = cv2.remap(picture, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         levels = _seen_on(picture, centre, look.radius_px - 2.5 * unit)
         cost, least = _weigh(profile, r, edge, blurs, noise, levels, inside)
         scale = max(1.0, float(np.median(least[inside])) / r.size)
@@ -92,9 +94,11 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         found, variance, apart = _likeliest(cost, ux, uy, inside)
         step = unit * float(np.hypot(found[0], found[1]))
         centre += unit * np.clip(found[:2], -1.5, 1.5)
-        if unit == 1 and step < 0.1:  # the costs were taken on rays from near there
+        if unit == 1 and step < _SETTLED:
             break
-    if step > 0.3:
+        # a coarse turn, if the guess was poor: its reach is far, and it takes less of what is drawn for the outline
+        unit = wide if turn == 0 and step > _POOR else 1.0
+    else:
         return None
     sigma = np.sqrt(_TIED * variance)
     within = profile[:, (r < -0.5 - edge) & (r > -3.0 - edge)].mean(axis=1)
@@ -114,7 +118,10 @@ def _seen_on(picture: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarr
     """The levels seen on the bob, in units of its contrast."""
     rows, columns = np.ogrid[: picture.shape[0], : picture.shape[1]]
     on = picture[np.hypot(columns - centre[0], rows - centre[1]) < max(radius, 2.0)]
-    return np.quantile(on, _LEVELS).astype(np.float32) if on.size > 8 else np.ones(len(_LEVELS), np.float32)
+    if on.size <= 8:
+        return np.ones(_LEVELS.size, np.float32)
+    ranks = np.rint(_LEVELS * (on.size - 1)).astype(int)
+    return np.partition(on, ranks)[ranks]
 
 
 def _grid(edge: float, blur: int) -> np.ndarray:
@@ -131,12 +138,15 @@ class _Model(NamedTuple):
     within: np.ndarray
     shell: np.ndarray
     volume: np.ndarray
+    addresses: tuple[int, ...]  # of these
     first_px: float  # the first sample, beyond the outline
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _model(edge: float, blur: int, noise: float) -> _Model:
     from scipy.special import ndtr
+
+    from toolkit.motion.compiled import address
 
     r = _grid(edge, blur)
     ends = np.linspace(-0.5, 0.5, 1 + 2 * blur) * blur
@@ -159,7 +169,7 @@ def _model(edge: float, blur: int, noise: float) -> _Model:
     volume = 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
     parts = (whiten, (whiten @ within[..., None])[..., 0], (whiten @ shell[..., None])[..., 0], volume - volume.min())
     a, b, c, d = (np.where(np.abs(p) < 1e-9, 0, p).astype(np.float32) for p in parts)  # denormal numbers are slow
-    return _Model(a, b, c, d, float(r[0]))
+    return _Model(a, b, c, d, tuple(address(p) for p in (a, b, c, d)), float(r[0]))
 
 
 def _weigh(
@@ -176,26 +186,29 @@ def _weigh(
     from toolkit.motion.compiled import address, call
 
     rays, kinds = len(profile), _SHIFTS.size * (1 + _SHELLS.size)
+    order = np.argsort(blurs, kind="stable")
+    blurs = blurs[order]
     ends = np.flatnonzero(np.diff(blurs, prepend=-1, append=-1))
     runs = []
     for begin, end in pairwise(ends.tolist()):
         model = _model(edge, int(blurs[begin]), noise)
         size = model.within.shape[1]
         first, shells = round((model.first_px - r[0]) / _STEP), len(model.volume) // _SHIFTS.size
-        runs.append((begin, end, first, size, shells, *(address(a) for a in model[:4])))
+        runs.append((begin, end, first, size, shells, *model.addresses))
     arrays = (
-        np.ascontiguousarray(profile.T),
+        np.ascontiguousarray(profile.T[:, order]),
         np.array(runs, np.int64),
         np.array([*levels, levels.mean(), _STRAY], np.float32),
         _CHANCES,
-        inside.astype(np.float32),
+        inside[order].astype(np.float32),
+        order,
         np.empty(levels.size * kinds * rays + 4 * rays + _ALIKE, np.float32),
         np.empty((rays, _SHIFTS.size)),
         np.empty(rays, np.float32),
     )
     counts = (rays, len(runs), levels.size, _SHIFTS.size, 1 + _SHELLS.size, _ALIKE)
     call(_kernel("weigh_places", "_rim_kernel"), *(address(a) for a in arrays), *counts)
-    return arrays[6], arrays[7]
+    return arrays[7], arrays[8][np.argsort(order)]
 
 
 @cache
