@@ -13,8 +13,9 @@ from toolkit.trackers._disc_kernel import loop
 
 # The caller's places: addresses of the profiles (samples, rays), of the runs of rays that are blurred alike, of the levels
 # that a shell may have (behind them their mean, and what a stray ray is worth), of what each shell's chance costs, of which
-# rays count (0 or 1), of room for a number a level, place, shell and ray and a few lists of rays more, of the costs
-# (rays, places) and of each ray's least misfit; then how many there are of each. All are float32 but runs and costs.
+# rays count (0 or 1), of where each ray lies in the circle (all before are sorted by their blur), of room for a number a
+# level, place, shell and ray and a few lists of rays more, of the costs (rays in the circle, places) and of each ray's least
+# misfit (sorted); then how many there are of each. All are float32 but runs, the order and costs.
 (
     PROFILE, RUNS, LEVELS, CHANCES, COUNTED, ORDER, ROOM, COSTS, LEAST,
     RAY_COUNT, RUN_COUNT, LEVEL_COUNT, PLACE_COUNT, SHELL_COUNT, ALIKE,

@@ -80,9 +80,7 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         r = _grid(edge, int(blurs.max()))
         far = (look.radius_px + unit * r).astype(np.float32)
         x, y = (np.float32(c) + u.astype(np.float32)[:, None] * far for c, u in zip(centre, (ux, uy)))
-        last = (
-            int(np.searchsorted(r, 2.5 * edge + 0.5)) - 1
-        )  # a ray counts if the picture, which is convex, has that sample
+        last = int(np.searchsorted(r, 2.5 * edge + 0.5)) - 1  # the picture is convex: with it, it has those before
         inside = (x[:, last] >= 0) & (x[:, last] <= columns - 1) & (y[:, last] >= 0) & (y[:, last] <= rows - 1)
         if inside.sum() < 12:
             return None
@@ -156,7 +154,8 @@ def _model(edge: float, blur: int, noise: float) -> _Model:
         return np.asarray(ndtr((rims[..., None, None] + ends - r[:, None]) / sigma).mean(axis=-1))
 
     shift, depth = np.repeat(_SHIFTS, 1 + depths.size), np.tile([-np.inf, *depths], _SHIFTS.size)
-    sharp = np.tile([False, *(np.arange(depths.size) < _SHARP.size)], _SHIFTS.size)[:, None]
+    # where shells are told, a ray without one is a step by one of the levels, from anywhere; else it is the disc's
+    sharp = np.tile([not depths.size, *(np.arange(depths.size) < _SHARP.size)], _SHIFTS.size)[:, None]
     disc = covered(shift, edge)
     core = np.where(sharp, disc * covered(shift - depth, _SOFT), covered(shift - depth, edge))
     within, shell = core, disc - core
