@@ -339,7 +339,7 @@ def fit(places: Any) -> None:
     pieces = int(length / math.sqrt(disc[2] + 1.0)) + 1
     pieces = pieces if pieces < 16 else 16
     first = 0 if contrast != 0.0 else 1  # the first turn on which the centre moves
-    cut, count, level, damp, settled = math.inf, 0, 0.0, 1.0, False
+    cut, clean, count, level, damp, settled = math.inf, 0.0, 0, 0.0, 1.0, False
     for turn in range(places[TURNS] + first):
         moved = False
         for k in range(4):
@@ -403,14 +403,13 @@ def fit(places: Any) -> None:
         if not (0.0 <= disc[0] <= places[COLUMNS] - 1.0 and 0.0 <= disc[1] <= places[ROWS] - 1.0):
             return
         settled = still or free == 8 or (damp == 1.0 and size < 0.3)
-        limit = 0.25 * abs(shade[0] - shade[3] * level)
-        limit = limit if limit > 5.0 * noise else 5.0 * noise
-        if still and (cut < math.inf or largest(skip(lists, _REST * most), count) <= limit):
-            break
+        clean = 0.12 * abs(shade[0] - shade[3] * level)
+        clean = clean if clean > 5.0 * noise else 5.0 * noise
+        if still and (cut < math.inf or (free == 6 and largest(skip(lists, _REST * most), count) <= clean)):
+            break  # at once only where what is judged below would be no better after another turn
         if turn >= first:
-            cut = limit
-    clean = 0.12 * abs(shade[0] - shade[3] * level)
-    clean = clean if clean > 5.0 * noise else 5.0 * noise
+            cut = 0.25 * abs(shade[0] - shade[3] * level)
+            cut = cut if cut > 5.0 * noise else 5.0 * noise
     look_around(lists, most, count, disc, clean, skip(work, _SECTORS), out)
     if not settled or right[9] < 6.0 or math.isnan(out[12]):
         return
