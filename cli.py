@@ -1,12 +1,14 @@
 """The command `pendulab`: parse, call, print. No physics; heavy imports stay inside the commands."""
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -399,6 +401,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):  # Thai and θ also where the console's own encoding cannot
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
+    signal.signal(signal.SIGINT, _interrupt)
     try:
         code = app(prog_name="pendulab", standalone_mode=False)
     except (typer.Abort, KeyboardInterrupt):
@@ -420,6 +423,24 @@ def main() -> None:
     if code == 130:  # Ctrl-C, by whichever way it came through the parser
         _fail("stopped; nothing unfinished was left behind", 130)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+_interrupted = Event()
+
+
+def _interrupt(*_: object) -> None:
+    """Ctrl-C: raised here and, where some library's code swallows that, again at the next step of the work."""
+    _interrupted.set()
+    raise KeyboardInterrupt
+
+
+def _unless_interrupted(show: "Progress") -> "Progress":
+    def step(stage: str, fraction: float) -> None:
+        if _interrupted.is_set():
+            raise KeyboardInterrupt
+        show(stage, fraction)
+
+    return step
 
 
 def _fail(sentence: str, code: int, tail: str = "") -> None:
@@ -484,7 +505,7 @@ def _progress() -> "Iterator[Progress]":
     from toolkit.progress import silent
 
     if not sys.stderr.isatty():
-        yield silent
+        yield _unless_interrupted(silent)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -504,7 +525,7 @@ def _progress() -> "Iterator[Progress]":
         from toolkit.motion import compiled
 
         compiled.listener = lambda sentence: show(sentence, 0.0)
-        yield show
+        yield _unless_interrupted(show)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -308,6 +309,20 @@ def test_help_of_every_command():
     ]:
         assert command in listing.stdout
         assert pendulab(command, "--help").returncode == 0
+
+
+def test_an_interrupt_that_a_library_swallows_is_raised_at_the_next_step():
+    import cli
+
+    step = cli._unless_interrupted(lambda stage, fraction: None)
+    step("tracking", 0.1)
+    try:
+        with contextlib.suppress(KeyboardInterrupt):  # the library
+            cli._interrupt()
+        with pytest.raises(KeyboardInterrupt):
+            step("tracking", 0.2)
+    finally:
+        cli._interrupted.clear()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
