@@ -217,7 +217,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
     swing = whole_swing(followed, places, video.path)
     places, swing = place_lost_frames(places, swing, warnings)
-    require_pendulum(swing, places, video.path)
+    require_pendulum(swing, places, (video.width_px, video.height_px), video.path)
     places = places.without(out_of_time(places, swing, log, warnings))
     places = places.without(lone_strays(places, swing, log))
 

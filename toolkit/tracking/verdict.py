@@ -17,19 +17,25 @@ _STRAYS_PX, _STRAYS = (
     0.1,
     0.04,
 )  # the least that strays, and the share of the bob's radius that does, whatever its error bar
+_ENDLESS = 20  # so many times longer than the clip, half a period is no swing
+_STRAIGHT = 20  # diagonals of the picture: a pivot farther off is none
 _UNEVEN_PX = 0.15  # by so much the places of an uneven bob may stray, unmentioned
 
 
-def require_pendulum(swing: Swing, places: Places, path: Path) -> None:
-    """Raises JobError where what was followed does not move like a pendulum."""
+def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], path: Path) -> None:
+    """Raises JobError where what was followed in a picture of `size_px` does not move like a pendulum."""
     t, good, extent = places.t_s, places.good, places.extent_px
     span = float(t[good][-1] - t[good][0])
-    if span < 0.5 * swing.period_s:
+    if 0.5 * swing.period_s / _ENDLESS < span < 0.5 * swing.period_s:
         raise JobError(
             f"{path} shows {span:.2f} s, less than half a period ({0.5 * swing.period_s:.2f} s); film at least one period"
         )
     amplitude = swing.amplitude_rad(t[good])
     reasons = []
+    if span <= 0.5 * swing.period_s / _ENDLESS:
+        reasons.append("it does not swing back")
+    if swing.length_px > _STRAIGHT * np.hypot(*size_px):
+        reasons.append("it moves along a straight line")
     shaky = 0.06 if good.mean() > 0.95 else 0.04  # a hand-held camera before a plain wall: told as a warning
     if swing.rms_px > max(shaky * extent, 0.3):
         reasons.append(f"it strays {swing.rms_px:.1f} px from a swing of {extent:.0f} px")
