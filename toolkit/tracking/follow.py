@@ -10,12 +10,12 @@ import numpy as np
 
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
-from toolkit.tracking.learn import Known, restarted
+from toolkit.tracking.learn import Known
 from toolkit.tracking.looks import light_on
 from toolkit.tracking.search import find_round_near, silhouette
 from toolkit.tracking.stillness import CameraShift
 from toolkit.tracking.string_line import measure_string
-from toolkit.tracking.swing import fit_swing
+from toolkit.tracking.swing import CALM, fit_swing
 from toolkit.tracking.trail import Rough
 from toolkit.video import Frame
 
@@ -315,7 +315,7 @@ class Follower(Known):
         from it in the last frames."""
         recent = list(self.recent)[-2:]
         if recent and abs(t - self.swing.t0_s) > 1.0:  # start anew from near by, so that no long way is integrated
-            self.swing = replace(self.swing, values=restarted(self.swing, recent[-1][0]), t0_s=recent[-1][0])
+            self.swing = replace(self.swing, values=self.swing.values_at(recent[-1][0]), t0_s=recent[-1][0])
         v = self.swing.values.tolist()
         theta, rate = (a.tolist() for a in self.swing.angle(np.array([*(r[0] for r in recent), t])))
         if not isfinite(sum(theta) + rate[-1]):  # a motion fitted to too little may run away
@@ -342,8 +342,7 @@ class Follower(Known):
         if len(good) < 20:
             return
         t, x, y = np.array([(r.t_s[k], r.place[k].x_px, r.place[k].y_px) for k in good]).T
-        calm = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}  # little was seen yet: no wild guesses
-        swing = fit_swing(t, x, y, np.full(t.size, 0.5), restarted(self.swing, t[0]), prior=calm)
+        swing = fit_swing(t, x, y, np.full(t.size, 0.5), self.swing.values_at(t[0]), prior=CALM)
         if swing is not None and swing.rms_px < 0.25 * self.look.radius_px + 1:
             self.swing = swing
 

@@ -58,7 +58,7 @@ def fit_jointly(
         own = true_sigma(t[good], picture, (sx, sy), velocity, 0 * shake.sigma[good], time_sigma_s, rough=True)
         return found._replace(x=own.x, y=own.y)
 
-    start = np.array(swing.values_at(t[good][0], camera.fps_factor))
+    start = swing.values_at(t[good][0], camera.fps_factor)
     when = t / camera.fps_factor
     mx, my = swing.position(t)
     joint = Joint(None, factors(mx, my, rough=True), mx, my)

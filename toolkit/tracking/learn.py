@@ -116,7 +116,7 @@ class Known:
             points[i] = (x - dx, y - dy)
         t = np.array([batch[i].t_s for i in points])
         x, y = np.array(list(points.values())).T
-        better = fit_swing(t, x, y, np.full(t.size, 0.3), restarted(rough.swing, t[0]))
+        better = fit_swing(t, x, y, np.full(t.size, 0.3), rough.swing.values_at(t[0]))
         self.swing = better or self.swing
         return points
 
@@ -223,7 +223,7 @@ class Known:
             return None
         t = np.array([batch[i].t_s for i in places])
         x, y, misfit, visible = np.array([(p.x_px, p.y_px, p.misfit, p.visible) for p in places.values()]).T
-        swing = fit_swing(t, x, y, np.full(t.size, 0.1), restarted(self.swing, t[0]))
+        swing = fit_swing(t, x, y, np.full(t.size, 0.1), self.swing.values_at(t[0]))
         if swing is None:
             return None
         # not beside a frame on which it was not found: something hid a part of it there
@@ -319,11 +319,3 @@ def _told_choice(tried: list[Trial], contrast: float) -> str:
             f"{t.localiser.name} {t.misfit / max(contrast, 1.0):.0%}" for t in sorted(tried, key=lambda t: t.misfit)
         ),
     )
-
-
-def restarted(swing: Swing, t0: float) -> np.ndarray:
-    """The motion's values with its state at time t0."""
-    theta, rate = swing.angle(np.array([t0]))
-    values = swing.values.copy()
-    values[7:] = theta[0], rate[0]
-    return values

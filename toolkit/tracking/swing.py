@@ -17,6 +17,8 @@ from toolkit.motion.compiled import address, call, kernel
 from toolkit.tracking.least_squares import least_squares
 
 NAMES = ("pivot_x", "pivot_y", "length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0")
+CALM = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}
+"""The damping of a pendulum of which little is known yet, as a prior."""
 
 
 @dataclass(frozen=True)
@@ -69,14 +71,14 @@ class Swing:
         speed = self.values[2] * rate
         return speed * np.cos(direction), -speed * np.sin(direction)
 
-    def values_at(self, t_s: float, fps_factor: float = 1.0) -> list[float]:
-        """The values with the state at t_s, for times divided by `fps_factor`."""
+    def values_at(self, t_s: float, fps_factor: float = 1.0) -> np.ndarray:
+        """The values (9,) with the state at t_s, for times divided by `fps_factor`."""
         theta, rate = self.angle(np.array([t_s]))
         values = self.values.copy()
         values[7:] = theta[0], rate[0] * fps_factor
         values[4] *= fps_factor**2
         values[5] *= fps_factor
-        return [float(v) for v in values]
+        return values
 
     def amplitude_rad(self, t_s: np.ndarray) -> float:
         """Largest |θ| at the given times."""

@@ -9,9 +9,7 @@ import numpy as np
 from toolkit.errors import JobError
 from toolkit.tracking.acquire import REMEDY
 from toolkit.tracking.places import Places
-from toolkit.tracking.swing import Swing, fit_swing, start_swing
-
-_CALM = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}  # damping of a pendulum of which little is known yet
+from toolkit.tracking.swing import CALM, Swing, fit_swing, start_swing
 
 
 def whole_swing(followed: Swing, places: Places, path: Path) -> Swing:
@@ -22,10 +20,7 @@ def whole_swing(followed: Swing, places: Places, path: Path) -> Swing:
     """
     t, x, y = places.t_s, places.x_px, places.y_px
     chosen = np.flatnonzero(places.good)
-    theta, rate = followed.angle(t[chosen[:1]])
-    values = followed.values.copy()
-    values[7:] = theta[0], rate[0]
-    swing = _grown(values, t, x, y, chosen)
+    swing = _grown(followed.values_at(t[chosen[0]]), t, x, y, chosen)
     if swing is None or swing.rms_px > 0.02 * places.extent_px:
         first = chosen[t[chosen] < t[chosen[0]] + 1.5 * followed.period_s]
         other = start_swing(t[first], x[first], y[first]) if first.size >= 12 else None
@@ -46,10 +41,10 @@ def _grown(values: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, chos
         part = chosen[t[chosen] <= stop]
         if part.size >= 12:
             p = part[:: max(1, part.size // 1500)]
-            calm = _CALM if stop < t[-1] else None
+            calm = CALM if stop < t[-1] else None
             swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=calm)
             if swing is None and calm is None:
-                swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=_CALM)
+                swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=CALM)
             if swing is None:
                 return None
             values = swing.values
