@@ -204,6 +204,7 @@ def _require_frames(batch: list[Frame], video: Video) -> None:
 def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None, fps_factor: float) -> Track:
     """Judge the whole motion, bridge the gaps, make σ true."""
     record, look = follower.record, follower.look
+    size_px = video.width_px, video.height_px
     log: list[str] = []
     warnings: list[str] = []
     t = even_times(np.array(record.t_s), video, log)
@@ -217,7 +218,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
     swing = whole_swing(followed, places, video.path)
     places, swing = place_lost_frames(places, swing, warnings)
-    require_pendulum(swing, places, (video.width_px, video.height_px), video.path)
+    require_pendulum(swing, places, size_px, video.path)
     places = places.without(out_of_time(places, swing, log, warnings))
     places = places.without(lone_strays(places, swing, log))
 
@@ -225,9 +226,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
     off_px = misfit * look.radius_px / 3
     strings = _strings(record, places, look.radius_px, fps_factor)
-    camera = Camera(
-        (video.width_px, video.height_px), pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor
-    )
+    camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor)
     joint = fit_jointly(places, swing, shake, time_sigma, strings.seen(), camera)
 
     rx, ry = ((p - m)[good] for p, m in ((places.x_px, joint.x_px), (places.y_px, joint.y_px)))

@@ -37,7 +37,7 @@ class Problem:
 
 
 def problems() -> tuple[Problem, ...]:
-    """P1–P5 of the project's measurements, a driven one near resonance (D) and a slack string (S)."""
+    """P1–P5 of the project's measurements, a driven one near resonance (D), a slack string (S) and the linear one (L)."""
     bare = Scene(Pendulum(mass_kg=0.25, length_m=0.5), Release(1.0), Environment(g_m_per_s2=_G))
     light, unit = Pendulum(0.05, 0.5), Pendulum(1.0, 1.0)
     omega_g = math.sqrt(_G / 0.5)

@@ -127,12 +127,9 @@ def kernel(name: str, module: str = "", what: str = "") -> Callable[[int, None, 
         return [WHOLES], False, getattr(importlib.import_module(module or f"toolkit.motion.kernels.{name}"), name)
 
     files = _kernel_files()
-    if module:
+    if module:  # one kernel of a folder may use another
         file = Path(__file__).parents[2].joinpath(*module.split(".")).with_suffix(".py")
-        files = [
-            Path(__file__).parent / "kernels" / "pointer.py",
-            *sorted(file.parent.glob("_*.py")),
-        ]  # one kernel may use another
+        files = [Path(__file__).parent / "kernels" / "pointer.py", *sorted(file.parent.glob("_*.py"))]
     texts = [file.read_bytes() for file in files]
     address = machine_code(f"{name}_{key_of(*texts)}", source, what or "the equation of motion")
     return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)

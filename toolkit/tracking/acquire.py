@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.errors import JobError, UsageError
 from toolkit.trackers.localiser import Look
+from toolkit.tracking.repeat import repeats
 from toolkit.tracking.search import (
     Hypothesis,
     even_light,
@@ -27,13 +28,6 @@ _MOST = 0.9  # of the frames: a bob seen on fewer is looked for in other ways to
 REMEDY = "give --bob X,Y (its centre in px on the first frame)"
 
 
-def _repeats(batch: list[Frame]) -> frozenset[int]:
-    """Frames that show the one before once more; none where that is no exception (nothing moves between frames)."""
-    prints = [f.luma[4::16, 4::16].astype(np.int16) for f in batch]
-    found = frozenset(i for i in range(1, len(batch)) if np.abs(prints[i] - prints[i - 1]).max() <= 1)
-    return found if len(found) < 0.3 * len(batch) else frozenset()
-
-
 def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float | None, what: str) -> Rough:
     """The thing in `batch` that is round and swings. `bob` is where it is on the first frame, if the user said so.
 
@@ -42,7 +36,7 @@ def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float 
     height, width = batch[0].luma.shape
     if bob is not None and not (0 <= bob[0] < width and 0 <= bob[1] < height):
         raise UsageError(f"bob ({bob[0]:g}, {bob[1]:g}) lies outside the picture of {width}×{height} px")
-    repeated = _repeats(batch)
+    repeated = repeats(batch)
     candidates, samples = _hypotheses(batch, bob, radius, colour=False)
     moved = bool(candidates)
     best = _likeliest(batch, candidates, samples, radius, repeated)

@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 import math
-from functools import cache
-from typing import Any
 
 import numpy as np
 
 from toolkit.motion.compiled import address, call, kernel
-
-
-@cache
-def _kernel() -> Any:
-    return kernel("add", "toolkit.tracking._back_kernel", "the background's mean")
 
 
 class Background:
@@ -44,8 +37,9 @@ class Background:
         numbers = np.array([bx - x0, by - y0, radius, ux / length, uy / length, 1 / gain, most])
         plane = np.ascontiguousarray(plane, np.float32)
         skipped = 4 * (y0 * self.mean.shape[1] + x0)
+        add = kernel("add", "toolkit.tracking._back_kernel", "the background's mean")
         call(
-            _kernel(), plane.ctypes.data, address(self.mean) + skipped, address(self.seen) + skipped, address(numbers),
+            add, plane.ctypes.data, address(self.mean) + skipped, address(self.seen) + skipped, address(numbers),
             y1 - y0, x1 - x0, plane.shape[1], self.mean.shape[1],
         )  # fmt: skip
 

@@ -12,6 +12,7 @@ from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
 from toolkit.tracking.learn import Known
 from toolkit.tracking.looks import light_on
+from toolkit.tracking.repeat import alike, thinned
 from toolkit.tracking.search import find_round_near, silhouette
 from toolkit.tracking.stillness import CameraShift
 from toolkit.tracking.string_line import measure_string
@@ -61,9 +62,11 @@ class Follower(Known):
         self._shade_scatter = 0.03 * abs(rough.look.contrast)
         self.first: list[Frame] = []  # the frames read ahead, if they are the first that will be followed
         self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
-        self._print: np.ndarray | None = None
-        self._usually_unlike = np.nan  # how much of a bob with a pattern differs from what stands still
-        self._frame: Frame | None = None  # the one that is measured
+        self._picture: np.ndarray | None = None  # the one that is measured, thinned
+        self._unlike_seen = (
+            np.nan
+        )  # how much of a bob with a pattern differs from what stands still, at the place judged last
+        self._usually_unlike = np.nan  # and lately
         self._speed = 0.0  # of the bob on it, px/s
         self._lit: tuple[float, np.ndarray] = (np.nan, np.empty(0))  # the bob's brightness lately, and the picture's
 
@@ -74,7 +77,8 @@ class Follower(Known):
         if (self.hidden or len(self.recent) < 3) and frame.index in self.found:
             # the motion fitted to the start may be poor at its rim
             guess = self._guess(*self.found[frame.index], guess.streak_x_px, guess.streak_y_px)
-        repeated = self._is_repeat(frame)
+        before, self._picture = self._picture, thinned(frame)
+        repeated = before is not None and alike(before, self._picture)
         place, patch = (NOWHERE, None) if repeated else self._measure(frame, guess)
         r = self.record
         r.index.append(frame.index)
@@ -84,7 +88,7 @@ class Follower(Known):
         r.shift.append(shift if self.shaking else None)
         r.repeated.append(repeated)
         if patch is not None:
-            self._remember(frame, patch, place)
+            self._remember(frame.t_s, place)
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
                 self._refit()
             self._update_background(patch, place, guess)
@@ -101,7 +105,6 @@ class Follower(Known):
     def _measure(self, frame: Frame, guess: Guess) -> tuple[Place, Patch | None]:
         """Where the bob is, looked for at the guess, then around it; and the patch that shows it, None where what was found is
         not believed."""
-        self._frame = frame
         patch = self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)
         if patch is None or not self._believe(patch, place, guess):
@@ -207,9 +210,9 @@ class Follower(Known):
             return seen / light
         shade = min((seen / light, seen), key=lambda s: abs(s - self._shade))
         before, picture = self._lit
-        if abs(shade - self._shade) < 0.1 * abs(self.look.contrast) or isnan(before) or self._frame is None:
+        if abs(shade - self._shade) < 0.1 * abs(self.look.contrast) or isnan(before) or self._picture is None:
             return shade
-        whole = float(np.median(_coarse(self._frame) / np.maximum(picture, 1.0)))
+        whole = float(np.median(self._picture / np.maximum(picture, 1.0)))
         return min(shade, self._shade * seen / max(before * whole, 1.0), key=lambda s: abs(s - self._shade))
 
     def _least_visible(self) -> float:
@@ -243,7 +246,8 @@ class Follower(Known):
         """Does the bob differ from what is known to stand still where it is? Half behind a post of about its own brightness it
         seems whole: where nearly half of it could not be told from what is there without it, it is not believed."""
         if not self.look.even:
-            return not self._unlike(patch, place) < 0.65 * self._usually_unlike
+            self._unlike_seen = self._unlike(patch, place)
+            return not self._unlike_seen < 0.65 * self._usually_unlike
         shade = self._shade
         if isnan(shade) or not isfinite(place.wall):
             return True
@@ -261,17 +265,18 @@ class Follower(Known):
         shown = _back_at(patch._replace(back=patch.image), place, radius, _WITHIN)
         return float(np.mean(np.abs(shown - behind) > 0.2 * abs(self.look.contrast) + 4)) if behind.size else nan
 
-    def _remember(self, frame: Frame, patch: Patch, place: Place) -> None:
+    def _remember(self, t_s: float, place: Place) -> None:
         """What the next frames are judged by."""
         self.hidden = 0
-        self.recent.append((frame.t_s, place.x_px, place.y_px))
+        self.recent.append((t_s, place.x_px, place.y_px))
         if not self.look.even:  # a bob with a pattern has no one brightness
-            share = self._unlike(patch, place)
+            share = self._unlike_seen
             self._usually_unlike = share if isnan(self._usually_unlike) else 0.9 * self._usually_unlike + 0.1 * share
         if isnan(place.wall) or not self.look.even:
             return
         shade = self._shade_seen
-        self._lit = (place.contrast + place.wall, _coarse(frame))
+        if self._picture is not None:
+            self._lit = (place.contrast + place.wall, self._picture)
         if isnan(self._shade):
             self._shade = shade
         else:
@@ -284,7 +289,7 @@ class Follower(Known):
         if all(r.ok):
             return
         self._refit()
-        kept = self.recent, self.hidden
+        kept = self.recent, self.hidden, self._picture
         self.recent = deque(maxlen=3)
         for k in reversed(range(len(frames))):
             frame = frames[k]
@@ -292,21 +297,21 @@ class Follower(Known):
                 self.recent.append((frame.t_s, r.place[k].x_px, r.place[k].y_px))
                 self.hidden = 0
             elif self.recent and not r.repeated[k]:
+                self._picture = thinned(frame)
                 place, patch = self._measure(frame, self._ahead(frame))
                 if patch is not None:
                     r.place[k], r.ok[k] = place, True
-                    self._remember(frame, patch, place)
+                    self._remember(frame.t_s, place)
                 else:
                     self.hidden += 1
-        self.recent, self.hidden = kept
+        self.recent, self.hidden, self._picture = kept
 
     def _ahead(self, frame: Frame) -> Guess:
         """Where the bob should be on the frame, and its streak."""
         x, y, vx, vy = self._expect(frame.t_s)
         self._speed = hypot(vx, vy)
-        if not self._speed * self.interval_s < max(
-            self.shape
-        ):  # the motion ran away: no bob crosses the picture in a frame
+        # else the motion ran away: no bob crosses the picture in a frame
+        if not self._speed * self.interval_s < max(self.shape):
             self._speed = vx = vy = 0.0
         return self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
 
@@ -374,17 +379,6 @@ class Follower(Known):
                 line.sigma_angle_rad,
                 line.sigma_px,
             )
-
-    def _is_repeat(self, frame: Frame) -> bool:
-        """Is it the picture before, shown again?"""
-        coarse = _coarse(frame)
-        before, self._print = self._print, coarse
-        return before is not None and bool(np.abs(coarse - before).max() <= 1)
-
-
-def _coarse(frame: Frame) -> np.ndarray:
-    """A few of its pixels, int16."""
-    return frame.luma[4::16, 4::16].astype(np.int16)
 
 
 def _back_at(patch: Patch, place: Place, reach_px: float, offsets: np.ndarray) -> np.ndarray:

@@ -10,11 +10,7 @@ _FITS = 2.5  # a motion fits where places stray from it by less than so many tim
 _CLOCK = 3.0  # by how much a localiser may be worse along the motion than across it
 _SLOW = 0.35  # of the greatest speed: below it a clock that errs hardly moves the bob
 _FREE = 9  # what a fitted motion has taken from the residuals of each axis
-_LEAST, _USUAL, _MOST = (
-    0.5,
-    4.0,
-    10.0,
-)  # what a fit's own σ is multiplied by; beyond the last what is quick is not its own
+_LEAST, _USUAL, _MOST = 0.5, 4.0, 10.0  # what a fit's own σ is multiplied by; beyond the last the quick is not its own
 
 
 class Factors(NamedTuple):

@@ -7,8 +7,7 @@ Bobs collect a whole circle of votes, strings and soft shadows do not. Votes nee
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -197,7 +196,8 @@ def _vote(
     height, width = _bins(shape, bin_size)
     bins = np.empty(edges.shape[1], np.int64)
     numbers, found = np.array([reach, bin_size]), np.zeros((2, 3))
-    call(_kernel(), *(address(a) for a in (edges, numbers, table, bins, found)), edges.shape[1], height, width)
+    vote = kernel("vote", "toolkit.tracking._vote_kernel", "the search")
+    call(vote, *(address(a) for a in (edges, numbers, table, bins, found)), edges.shape[1], height, width)
     return [(x, y, votes) for x, y, votes in found.tolist()]
 
 
@@ -208,8 +208,3 @@ def _bins(shape: tuple[int, ...], bin_size: float) -> tuple[int, int]:
 def _table(shape: tuple[int, ...], bin_size: float) -> np.ndarray:
     """Room for the votes in a picture of this shape, and bins of this size or larger."""
     return np.zeros(_bins(shape, bin_size), np.float32)
-
-
-@cache
-def _kernel() -> Any:
-    return kernel("vote", "toolkit.tracking._vote_kernel", "the search")

@@ -6,8 +6,7 @@ first frame); a shift and a roll are fitted to them, windows that disagree (some
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,11 +32,6 @@ class CameraShift(NamedTuple):
 STILL = CameraShift(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _HALF = 12
 _WORST_SIGMA_PX = 0.15
-
-
-@cache
-def _kernel() -> Any:
-    return kernel("follow", "toolkit.tracking._anchor_kernel", "the camera's shift")
 
 
 class Anchors:
@@ -82,8 +76,9 @@ class Anchors:
         if n < 2:
             return None
         moved = np.zeros((n, 4))
+        follow = kernel("follow", "toolkit.tracking._anchor_kernel", "the camera's shift")
         call(
-            _kernel(), luma.ctypes.data, address(self.windows), address(self.points), address(self._last), address(moved),
+            follow, luma.ctypes.data, address(self.windows), address(self.points), address(self._last), address(moved),
             n, self.windows.shape[1], *luma.shape, *luma.strides,
         )  # fmt: skip
         good = moved[:, 3] > 0

@@ -8,8 +8,7 @@ ends), first on the piece near the bob, then on the whole length.
 from __future__ import annotations
 
 import math
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,18 +31,14 @@ class StringLine(NamedTuple):
 _ROOM = 4096  # numbers that the kernel works in, and more
 
 
-@cache
-def _kernel() -> Any:
-    return kernel("ridge", "toolkit.tracking._string_kernel", "the string's measurement")
-
-
 def measure_string(
     luma: np.ndarray, bob: tuple[float, float], pivot: tuple[float, float], radius_px: float
 ) -> StringLine | None:
     """The string in one frame from where bob and pivot are thought to be; None where no string is seen."""
     numbers, out, room = np.array([*bob, *pivot, radius_px, _start(radius_px)]), np.zeros(8), np.empty(_ROOM)
     addresses = luma.ctypes.data, address(numbers), address(out), address(room)
-    call(_kernel(), *addresses, *luma.shape, *luma.strides)
+    ridge = kernel("ridge", "toolkit.tracking._string_kernel", "the string's measurement")
+    call(ridge, *addresses, *luma.shape, *luma.strides)
     found, x, y, along_x, along_y, sigma_angle, sigma, strength = out.tolist()
     if not (found and strength > 8 and np.all(np.isfinite(out))):
         return None

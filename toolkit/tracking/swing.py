@@ -8,8 +8,6 @@ see how much the measured positions scatter. It is not the fit of the physics: t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -90,11 +88,6 @@ def _place(values: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return values[0] + values[2] * np.sin(direction), values[1] + values[2] * np.cos(direction)
 
 
-@cache
-def _kernel() -> Any:
-    return kernel("swing", "toolkit.tracking._swing_kernel", "the swing")
-
-
 def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
     """(2, n): θ and its rate at times t (n,) after that of the state in `values`, integrated from each to the next.
 
@@ -104,7 +97,8 @@ def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
     room = np.empty((*t.shape[:-1], 9 + 3 * n))  # of each motion: the values, the times, the angles and their rates
     room[..., :9] = values[..., :9]
     room[..., 9 : 9 + n] = t
-    call(_kernel(), address(room), n, room.size // (9 + 3 * n))
+    swing = kernel("swing", "toolkit.tracking._swing_kernel", "the swing")
+    call(swing, address(room), n, room.size // (9 + 3 * n))
     return room[..., 9 + n :].reshape(*t.shape[:-1], 2, n)
 
 

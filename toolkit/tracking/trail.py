@@ -14,8 +14,6 @@ from toolkit.tracking.sight import Sight
 from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.video import Frame
 
-_Fit = tuple[float, float, Look]
-
 
 @dataclass(frozen=True)
 class Rough:
@@ -125,7 +123,7 @@ class Trail:
         self.looks.append(fit[2])
         return True
 
-    def _fit(self, i: int, guess: Guess) -> _Fit | None:
+    def _fit(self, i: int, guess: Guess) -> tuple[float, float, Look] | None:
         look = self.look
         if self.stage is not None and self.stage.silhouette:
             patch = _on_stage(self.batch[i], self.sight, guess.x_px, guess.y_px, 2.2 * look.radius_px + 6, self.stage)

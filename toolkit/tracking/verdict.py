@@ -13,10 +13,8 @@ from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing
 
 _POOR_PICTURE = 0.12  # of the contrast
-_STRAYS_PX, _STRAYS = (
-    0.1,
-    0.04,
-)  # the least that strays, and the share of the bob's radius that does, whatever its error bar
+_STRAYS_PX = 0.1  # less does not stray, whatever its error bar
+_STRAYS = 0.04  # of the bob's radius: more does
 _ENDLESS = 20  # so many times longer than the clip, half a period is no swing
 _STRAIGHT = 20  # diagonals of the picture: a pivot farther off is none
 _UNEVEN_PX = 0.15  # by so much the places of an uneven bob may stray, unmentioned
@@ -26,14 +24,15 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
     """Raises JobError where what was followed in a picture of `size_px` does not move like a pendulum."""
     t, good, extent = places.t_s, places.good, places.extent_px
     span = float(t[good][-1] - t[good][0])
-    if 0.5 * swing.period_s / _ENDLESS < span < 0.5 * swing.period_s:
-        raise JobError(
-            f"{path} shows {span:.2f} s, less than half a period ({0.5 * swing.period_s:.2f} s); film at least one period"
-        )
+    half = 0.5 * swing.period_s
+    if half / _ENDLESS < span < half:
+        raise JobError(f"{path} shows {span:.2f} s, less than half a period ({half:.2f} s); film at least one period")
     amplitude = swing.amplitude_rad(t[good])
     reasons = []
-    if span <= 0.5 * swing.period_s / _ENDLESS:
-        reasons.append("it does not swing back")
+    if swing.values[4] <= 0:
+        reasons.append("nothing pulls it back")
+    if span <= half / _ENDLESS or not 0 < amplitude < np.pi:
+        reasons.append("it does not turn back")
     if swing.length_px > _STRAIGHT * np.hypot(*size_px):
         reasons.append("it moves along a straight line")
     shaky = 0.06 if good.mean() > 0.95 else 0.04  # a hand-held camera before a plain wall: told as a warning
@@ -41,13 +40,9 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
         reasons.append(f"it strays {swing.rms_px:.1f} px from a swing of {extent:.0f} px")
     if good.mean() < 0.6 and swing.rms_px > 0.015 * extent:
         reasons.append(f"it was seen on {good.mean():.0%} of the frames, straying {swing.rms_px:.1f} px")
-    if not 0 < amplitude < np.pi:
-        reasons.append("it does not turn back")
     growth, growth_sigma = _growth(swing, t[good])
     if growth - 3 * growth_sigma > 0.5:
         reasons.append(f"its swing grows by {np.expm1(growth):.0%}")
-    if swing.values[4] <= 0:
-        reasons.append("nothing pulls it back")
     if reasons:
         raise JobError(f"what moves in {path} is no pendulum ({reasons[0]}); if there is one, {REMEDY}")
 

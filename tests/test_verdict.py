@@ -1,0 +1,57 @@
+"""What moves and is no pendulum is refused in a sentence that says why; pendulums of all kinds are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolkit.errors import JobError
+from toolkit.tracking.places import Places
+from toolkit.tracking.swing import Swing
+from toolkit.tracking.verdict import require_pendulum
+
+SIZE_PX = (640, 480)
+TIMES = np.arange(180) / 30.0
+
+
+def judge(omega2=20.0, length=400.0, theta0=0.3, rate0=0.0, gamma=0.01, seen=None):
+    """Refused or not: a bob that goes exactly as the fitted motion says, seen on the frames `seen`."""
+    values = np.array([320.0, 20.0, length, 0.0, omega2, gamma, 0.0, theta0, rate0])
+    swing = Swing(values, np.zeros((9, 9)), 0.0, 0.02)
+    x, y = swing.position(TIMES)
+    good = np.ones(TIMES.size, bool) if seen is None else seen
+    sigma = np.full(TIMES.size, 0.02)
+    require_pendulum(swing, Places(TIMES, x, y, sigma, sigma, good, ~good), SIZE_PX, Path("clip.mp4"))
+
+
+@pytest.mark.parametrize(
+    "pendulum",
+    [
+        {},
+        {"theta0": 3.1},
+        {"theta0": 0.01},
+        {"length": 15 * 800.0, "theta0": 0.02, "omega2": 3.0},
+        {"gamma": 3.0},
+        {"omega2": (np.pi / 5.5) ** 2},  # just over half a period
+    ],
+)
+def test_a_pendulum_is_let_through(pendulum):
+    judge(**pendulum)
+
+
+@pytest.mark.parametrize(
+    ("motion", "why"),
+    [
+        ({"length": 25 * 800.0, "theta0": 0.01}, "straight line"),
+        ({"omega2": 1e-4, "theta0": 0.0, "rate0": 0.1}, "does not turn back"),
+        ({"rate0": 20.0}, "does not turn back"),  # over the top
+        ({"omega2": -1.0, "theta0": 0.01}, "nothing pulls it back"),
+        ({"gamma": -0.1}, "swing grows"),
+        ({"omega2": (np.pi / 6.5) ** 2}, "less than half a period"),
+    ],
+)
+def test_what_is_no_pendulum_is_refused_with_the_reason(motion, why):
+    with pytest.raises(JobError, match=why):
+        judge(**motion)
