@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import mpmath as mp
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from toolkit.errors import UsageError
 from toolkit.motion.elliptic import pendulum_period, solve_pendulum
+from toolkit.motion.exact_arithmetic import whole_multiple
 
 TIMES = np.concatenate([np.linspace(0, 30, 25), [100.3]])
 
@@ -163,3 +165,9 @@ def test_compiled_samples_are_the_elliptic_functions(theta0, omega0):
     plain, compiled = (solve_pendulum(t, theta0, omega0, 1.0, how) for how in (False, True))
     np.testing.assert_allclose(compiled.theta_rad, plain.theta_rad, rtol=0, atol=1e-13)
     np.testing.assert_allclose(compiled.omega_rad_per_s, plain.omega_rad_per_s, rtol=0, atol=1e-13)
+
+
+@given(st.integers(-(2**53), 2**53) | st.integers(-(2**26), 2**26), st.floats(1e-3, 1e3))
+def test_a_whole_multiple_loses_nothing(n, period):
+    high, low = whole_multiple(np.array([float(n)]), period)
+    assert Fraction(high[0]) + Fraction(low[0]) == n * Fraction(period)

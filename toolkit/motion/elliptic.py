@@ -24,7 +24,7 @@ import numpy as np
 
 from toolkit.errors import UsageError
 from toolkit.motion.blocks import blocks
-from toolkit.motion.exact_arithmetic import two_product
+from toolkit.motion.exact_arithmetic import whole_multiple
 
 _PI = math.pi
 _TWO_PI_DIGITS = Decimal("6.283185307179586476925286766559005768394")
@@ -77,7 +77,7 @@ def solve_pendulum(
     for part in blocks(t.size):
         now = t[part]
         count = np.rint(now / period)
-        whole, whole_lost = two_product(count, period)
+        whole, whole_lost = whole_multiple(count, period)
         # in periods of cn (libration) or of am, that is 2K (rotation)
         phase = phase0 + (direction / period) * ((now - whole) - whole_lost - count * period_lost)
         more = np.rint(phase)

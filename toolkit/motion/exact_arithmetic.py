@@ -29,6 +29,14 @@ def two_product(a: Any, b: Any) -> tuple[Any, Any]:
     return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
+def whole_multiple(n: np.ndarray, b: float) -> tuple[np.ndarray, np.ndarray]:
+    """n·b for whole numbers n (k,), k ≥ 1, as two parts whose sum is exact; in a third of the time while all |n| < 2²⁶."""
+    if np.abs(n).max() >= 2**26:
+        return two_product(n, b)
+    high, low = _split(b)  # 26 digits each
+    return n * high, n * low
+
+
 def root_of_difference_of_squares(a: float, b: float) -> tuple[float, float, int]:
     """√|a² − b²| as (rounded, lost) and the sign of a² − b²; relative error about 1e-31 however near a is to b."""
     difference, difference_lost = two_sum(a, -b)
