@@ -17,6 +17,7 @@ from toolkit.tracking.least_squares import least_squares
 NAMES = ("pivot_x", "pivot_y", "length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0")
 CALM = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}
 """The damping of a pendulum of which little is known yet, as a prior."""
+_LANES = 128  # numbers that the kernel works in, and more
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,8 @@ def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
     room[..., :9] = values[..., :9]
     room[..., 9 : 9 + n] = t
     swing = kernel("swing", "toolkit.tracking._swing_kernel", "the swing")
-    call(swing, address(room), n, room.size // (9 + 3 * n))
+    lanes = np.empty(_LANES)
+    call(swing, address(room), address(lanes), n, room.size // (9 + 3 * n))
     return room[..., 9 + n :].reshape(*t.shape[:-1], 2, n)
 
 
@@ -130,8 +132,21 @@ def fit_swing(
         pulls = [(values[i] - value) / sigma for i, (value, sigma) in tied.items()]
         return np.concatenate([(x - x_px) * weight, (y - y_px) * weight, pulls])
 
+    def slopes(values: np.ndarray) -> np.ndarray:
+        moved = values + np.eye(9)[index] * steps
+        moving = [row for row, i in enumerate(index) if i >= 4]  # the angle does not depend on the rest
+        angles = solve_swing(np.array([values, *moved[moving]]), np.tile(t, (len(moving) + 1, 1)))[:, 0]
+        theta = np.tile(angles[0], (len(index), 1))
+        theta[moving] = angles[1:]
+        (x, y), (x0, y0) = _place(moved.T[..., None], theta), _place(values, angles[0])
+        pulls = [(moved[:, i] - values[i]) / sigma for i, (_, sigma) in tied.items()]
+        return (
+            np.concatenate([(x - x0) * weight, (y - y0) * weight, np.reshape(pulls, (-1, len(index))).T], axis=1)
+            / steps[index][:, None]
+        ).T
+
     steps = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-6 * abs(start[4]), 1e-6, 1e-6, 1e-6, 1e-6])
-    least = least_squares(rest, start, steps, index, turns=turns)
+    least = least_squares(rest, start, steps, index, turns=turns, slopes=slopes)
     if least is None:
         return None
     dof = max(1, 2 * t.size - len(index))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.motion.compiled import address, call, kernel
 from toolkit.tracking.swing import NAMES as SWING_NAMES
 from toolkit.tracking.swing import Swing, solve_swing
 
@@ -78,7 +79,7 @@ class View:
         """Where the motion has the bob in the picture at stamps t_s; x_px, y_px tell its row."""
         v = self.values
         when = t_s - self.t0_s + v[AT["readout"]] * self.rows(x_px, y_px)
-        return self.see(v, v[9] * solve_swing(v, when)[0], self.sway(v, when))
+        return self.see(v, v[9] * solve_swing(v, when)[0], when)
 
     def angles(self, t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """θ (rad from the vertical) of places in the picture, and how the place moves with θ, (2, n) px/rad."""
@@ -118,24 +119,9 @@ class View:
         mx, my = self.middle_px
         return (x_px - mx) / (2 * mx) if self.rows_along_x else (y_px - my) / (2 * my)
 
-    @staticmethod
-    def sway(v: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """How far out of its plane the swing is, rad."""
-        phase = np.sqrt(np.abs(v[4])) * t
-        return np.asarray(v[14] * np.sin(phase) + v[15] * np.cos(phase))
-
-    def see(self, v: np.ndarray, theta: np.ndarray, sway: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the picture shows a bob at θ that is `sway` out of its plane."""
-        direction = theta + v[3]
-        in_plane = v[2] * np.cos(sway)
-        x, y, z = in_plane * np.sin(direction), in_plane * np.cos(direction), v[2] * np.sin(sway)
-        sy, cy, sp, cp = np.sin(v[10]), np.cos(v[10]), np.sin(v[11]), np.cos(v[11])
-        x, z = cy * x - sy * z, sy * x + cy * z
-        y, z = cp * y + sp * z, cp * z - sp * y
-        near = np.maximum(1 + np.exp(np.minimum(v[12], 1.5)) / (2 * max(self.middle_px)) * z, 0.05)
-        mx, my = self.middle_px
-        x, y = self.bend(v, mx + (v[0] - mx + x) / near, my + (v[1] - my + y) / near)
-        return x + v[17], y + v[18]
+    def see(self, v: np.ndarray, theta: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where the picture shows a bob that is at θ at times t, (n,) or (k, n)."""
+        return self._by_kernel("see", v, theta, t)
 
     def bend(self, v: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the lens shows what a straight one would show at x, y."""
@@ -146,23 +132,27 @@ class View:
 
     def straight(self, v: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where a lens that does not bend would show what is seen at x, y."""
-        if not np.any(v[13]):
-            return x, y
-        mx, my = self.middle_px
-        seen = np.minimum(((x - mx) ** 2 + (y - my) ** 2) / (mx * mx + my * my), 4.0)
-        grow = 1.0 + 0 * v[13]
-        for _ in range(6):
-            grow = 1 + v[13] * seen / grow**2
-        return mx + (x - mx) / grow, my + (y - my) / grow
+        return self._by_kernel("straight", v, x, y) if np.any(v[13]) else (x, y)
+
+    def _by_kernel(self, name: str, v: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the kernel of that name gives for `v` and two numbers a point, (n,) or (k, n)."""
+        sets = np.array(v.reshape(len(NAMES), -1).T, order="C")
+        out = np.empty((4, len(sets), a.shape[-1]))
+        out[0], out[1] = a, b
+        known = np.array(self.middle_px)
+        work = kernel(name, "toolkit.tracking._view_kernel", "the camera's view")
+        call(work, address(sets), address(known), address(out), *out.shape[1:])
+        x, y = out[2:] if v.ndim > 1 else out[2:, 0]
+        return x, y
 
     def _angles(self, v: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        sway = self.sway(v, t + v[16] * self.rows(x, y))
+        when = t + v[16] * self.rows(x, y)
         qx, qy = self.straight(v, x - v[17], y - v[18])
         theta = np.unwrap(np.arctan2(qx - v[0], qy - v[1])) - v[3]
         flat = not (np.any(v[10]) or np.any(v[11]) or np.any(v[13]))
         for _ in range(1 if flat else 4):
-            ax, ay = self.see(v, theta, sway)
-            bx, by = self.see(v, theta + 1e-5, sway)
+            ax, ay = self.see(v, theta, when)
+            bx, by = self.see(v, theta + 1e-5, when)
             tx, ty = (bx - ax) / 1e-5, (by - ay) / 1e-5
             theta = theta + ((x - ax) * tx + (y - ay) * ty) / (tx * tx + ty * ty)
         return theta, np.array([tx, ty])

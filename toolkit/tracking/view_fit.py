@@ -206,8 +206,7 @@ class _Problem:
         return solve_swing(motions, self.t + motions[:, 16:17] * self.rows)[:, 0]
 
     def _rest(self, v: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        sway = self.model.sway(v, self.t + v[16] * self.rows)
-        x, y = self.model.see(v, v[9] * angle, sway)
+        x, y = self.model.see(v, v[9] * angle, self.t + v[16] * self.rows)
         parts = [(x - self.x) * (self.wx / self.weaker), (y - self.y) * (self.wy / self.weaker)]
         if self.lines is not None:
             parts.append(self.line_rest(v) * (self.line_weight / self.weaker))
