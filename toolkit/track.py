@@ -16,7 +16,7 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
-from toolkit.tracking.clock import even_times, lone_strays, out_of_time, place_lost_frames, slips_told
+from toolkit.tracking.clock import even_times, lone_strays, out_of_time, place_lost_frames, slips_told, strays_told
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.joint import Camera, fit_jointly
 from toolkit.tracking.places import Places
@@ -220,7 +220,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     places, swing = place_lost_frames(places, swing, warnings)
     require_pendulum(swing, places, size_px, video.path)
     places = places.without(out_of_time(places, swing, log, warnings))
-    places = places.without(lone_strays(places, swing, log))
+    stray = lone_strays(places, *swing.position(places.t_s))
+    places = places.without(stray)
 
     good = places.good
     misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
@@ -228,6 +229,12 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     strings = _strings(record, places, look.radius_px, fps_factor)
     camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor)
     joint = fit_jointly(places, swing, shake, time_sigma, strings.seen(), camera)
+    missed = lone_strays(places, joint.x_px, joint.y_px)  # hidden while tilt, lens and shutter were not taken out
+    if missed.any():
+        places = places.without(missed)
+        good = places.good
+        joint = fit_jointly(places, swing, shake, time_sigma, strings.seen(), camera)
+    log += strays_told(places, stray | missed)
 
     rx, ry = ((p - m)[good] for p, m in ((places.x_px, joint.x_px), (places.y_px, joint.y_px)))
     rms_px = float(np.sqrt(0.5 * np.mean(rx**2 + ry**2)))

@@ -137,19 +137,24 @@ def place_lost_frames(places: Places, swing: Swing, warnings: list[str]) -> tupl
     return now, motion
 
 
-def lone_strays(places: Places, swing: Swing, log: list[str]) -> np.ndarray:
-    """Frames (n,) bool on which the bob was found far from where the motion and the frames about it have it: a picture shown
-    again, a post or a passer-by taken for it. None where they are so many that something else is amiss."""
-    rest = np.array([places.x_px, places.y_px]) - swing.position(places.t_s)
+def lone_strays(places: Places, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
+    """Frames (n,) bool on which the bob was found far from where the motion (n,) and the frames about it have it: a picture
+    shown again, a post or a passer-by taken for it. None where they are so many that something else is amiss."""
+    rest = np.array([places.x_px - x_px, places.y_px - y_px])
     apart = rest - [_running_median(r, places.good) for r in rest]
     usual = 1.4826 * np.median(np.abs(apart[:, places.good]), axis=1, keepdims=True) + _LEAST_PX / _STRAY
     stray = places.good & (np.hypot(*apart / usual) > _STRAY)
     if stray.sum() >= _LEFT_OUT * stray.size:
         return np.zeros(stray.size, bool)
     stray[stray] = ~_lead_on(rest / usual, places.good & ~stray, np.flatnonzero(stray))
+    return stray
+
+
+def strays_told(places: Places, stray: np.ndarray) -> list[str]:
+    """A sentence on the frames (n,) bool that were left out as strays, if any."""
     if not stray.any():
-        return stray
-    log.append(
+        return []
+    return [
         said(
             "track.lone_strays",
             "{frames} frame(s) show the bob far from where the motion and the frames about them have it, first at t = {t_s:.3f} s; "
@@ -157,8 +162,7 @@ def lone_strays(places: Places, swing: Swing, log: list[str]) -> np.ndarray:
             frames=int(stray.sum()),
             t_s=float(places.t_s[np.flatnonzero(stray)[0]]),
         )
-    )
-    return stray
+    ]
 
 
 def slips_told(places: Places, swing: Swing, x_px: np.ndarray, y_px: np.ndarray) -> list[str]:

@@ -1,4 +1,9 @@
-"""Least squares of a few parameters, by Levenberg–Marquardt with forward differences."""
+"""Least squares of a few parameters, by Levenberg–Marquardt with forward differences and steps that bend along the valley.
+
+Where data tell little of some combination of parameters, the valley of small residuals is long and curved, and straight
+steps creep along it. How the residuals bend along a step costs one look more and turns the step into the valley
+(geodesic acceleration: Transtrum and Sethna, arXiv:1201.5885).
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+
+_TRIED = 0.1  # of a step: how the residuals bend is seen over so much of it
+_BENT = 0.75  # a bend larger than this share of its step is none to believe
 
 
 class Minimum(NamedTuple):
@@ -59,10 +67,18 @@ def least_squares(
             return None
         done = False
         for _ in range(8):
+            damped = normal + damping * np.diag(np.diag(normal) + 1e-300)
+            trial = values.copy()
             try:
-                step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-300), pull)
+                step = -np.linalg.solve(damped, pull)
+                trial[index] += _TRIED * step
+                bend = ((rest(trial) - now) / _TRIED - jacobian @ step) / _TRIED
+                turned = -np.linalg.solve(damped, jacobian.T @ bend)
             except np.linalg.LinAlgError:
                 return None
+            size, bent = (v @ (np.diag(normal) * v) for v in (step, turned))
+            if bent <= (_BENT * _BENT) * size:
+                step += turned
             trial = values.copy()
             trial[index] += step
             after = rest(trial)

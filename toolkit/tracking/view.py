@@ -27,6 +27,14 @@ _UNITS = {"k1": "", "readout": "_s", "off_x": "_px", "off_y": "_px"}
 _ANGLES_SHOWN = 61  # places along the arc at which samples of the view are compared
 
 
+def motion_of(v: np.ndarray) -> np.ndarray:
+    """The motion's own values (…, 9) of views (…, 19), whose angle and rate at the start are the picture's: what a clip
+    tells does not change with the factor then."""
+    motion = v[..., :9].copy()
+    motion[..., 7:] /= v[..., 9:10]
+    return motion
+
+
 @dataclass(frozen=True)
 class View:
     """How the camera saw the swing. `values` in the order of `NAMES`; `shown` names the effects that the clip shows (the
@@ -67,7 +75,7 @@ class View:
     def swing(self, fps_factor: float = 1.0) -> Swing:
         """The motion alone, with times as they were before fps_factor divided them."""
         f = np.ones(9)
-        f[4], f[[5, 8]] = fps_factor**-2, 1 / fps_factor
+        f[4], f[5], f[7], f[8] = fps_factor**-2, 1 / fps_factor, 1 / self["factor"], 1 / (fps_factor * self["factor"])
         values = self.values[:9] * f
         return Swing(values, self.covariance[:9, :9] * np.outer(f, f), self.t0_s * fps_factor, 0.0)
 
@@ -79,7 +87,7 @@ class View:
         """Where the motion has the bob in the picture at stamps t_s; x_px, y_px tell its row."""
         v = self.values
         when = t_s - self.t0_s + v[AT["readout"]] * self.rows(x_px, y_px)
-        return self.see(v, v[9] * solve_swing(v, when)[0], when)
+        return self.see(v, v[9] * solve_swing(motion_of(v), when)[0], when)
 
     def angles(self, t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """θ (rad from the vertical) of places in the picture, and how the place moves with θ, (2, n) px/rad."""
@@ -121,7 +129,8 @@ class View:
 
     def see(self, v: np.ndarray, theta: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the picture shows a bob that is at θ at times t, (n,) or (k, n)."""
-        return self._by_kernel("see", v, theta, t)
+        x, y = self._by_kernel("see", v, (theta, t), 2)
+        return x, y
 
     def bend(self, v: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the lens shows what a straight one would show at x, y."""
@@ -132,18 +141,25 @@ class View:
 
     def straight(self, v: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where a lens that does not bend would show what is seen at x, y."""
-        return self._by_kernel("straight", v, x, y) if np.any(v[13]) else (x, y)
-
-    def _by_kernel(self, name: str, v: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the kernel of that name gives for `v` and two numbers a point, (n,) or (k, n)."""
-        sets = np.array(v.reshape(len(NAMES), -1).T, order="C")
-        out = np.empty((4, len(sets), a.shape[-1]))
-        out[0], out[1] = a, b
-        known = np.array(self.middle_px)
-        work = kernel(name, "toolkit.tracking._view_kernel", "the camera's view")
-        call(work, address(sets), address(known), address(out), *out.shape[1:])
-        x, y = out[2:] if v.ndim > 1 else out[2:, 0]
+        if not np.any(v[13]):
+            return x, y
+        x, y = self._by_kernel("straight", v, (x, y), 2)
         return x, y
+
+    def misses(self, v: np.ndarray, lines: np.ndarray) -> np.ndarray:
+        """How far lines (7, n) pass the pivot, over the uncertainty there, (n,) or (k, n). Rows: x, y of a place on each as seen,
+        and of a lower one; by how much that is turned since, over factor and readout; σ of direction (rad) and place (px)."""
+        return self._by_kernel("miss", v, tuple(lines), 1)[0]
+
+    def _by_kernel(self, name: str, v: np.ndarray, given: tuple[np.ndarray, ...], found: int) -> np.ndarray:
+        """What the kernel of that name finds for `v` from the numbers given of each point, (n,) or (k, n) each."""
+        sets, middle = np.array(v.reshape(len(NAMES), -1).T, order="C"), np.array(self.middle_px)
+        lists = np.empty((len(given) + found, len(sets), given[0].shape[-1]))
+        for row, numbers in zip(lists, given):
+            row[:] = numbers
+        work = kernel(name, "toolkit.tracking._view_kernel", "the camera's view")
+        call(work, address(sets), address(middle), address(lists), *lists.shape[1:])
+        return lists[len(given) :] if v.ndim > 1 else lists[len(given) :, 0]
 
     def _angles(self, v: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         when = t + v[16] * self.rows(x, y)

@@ -19,7 +19,7 @@ from toolkit.tracking.least_squares import Minimum, least_squares
 from toolkit.tracking.pivot import line_pivot
 from toolkit.tracking.swing import NAMES as SWING_NAMES
 from toolkit.tracking.swing import solve_swing
-from toolkit.tracking.view import AT, GROUPS, NAMES, View
+from toolkit.tracking.view import AT, GROUPS, NAMES, View, motion_of
 
 _STEPS = np.array(
     [1e-3, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-4, 1e-6, 1e-5, 1e-5, 1e-7, 1e-3, 1e-3]
@@ -35,6 +35,8 @@ _SQUARE = (*SWING_NAMES, "factor")
 _BENDING = tuple(AT[name] for name in NAMES[10:])  # what bends the model: sampled; the rest follows linearly
 _MOST = 160  # positions, and half as many lines, are enough to see what the camera did
 _CLEAR = 25.0  # by how much χ² must fall before a camera effect is believed
+_NEARNESSES = (-1.7, -1.2, -0.7, -0.2, 0.3)  # along which a valley is looked for: two standard deviations either way
+_LIKELY = 10.0  # so much higher in χ², a place still stands for some of what the clip allows
 _SAMPLES, _ROUNDS, _ENOUGH = 100, 10, 50  # draws a round; so many independent ones are wanted
 
 
@@ -126,7 +128,7 @@ def fit_view(
         return None
     try:
         covariance = _spread(chosen, _names(shown))
-        samples, weights = problem.sample(modes)
+        samples, weights = problem.sample(modes + problem.along(modes[0]))
     except np.linalg.LinAlgError:
         return None
     return View(
@@ -190,8 +192,9 @@ class _Problem:
             # a straight line fitted to a bent string crosses it in the two Gauss points
             reach = np.maximum(np.nan_to_num(lines.half_px, nan=1.0), 1.0) / np.sqrt(3)
             dx, dy = reach * np.sin(lines.angle_rad), reach * np.cos(lines.angle_rad)
-            self.crossed = lines.x_px - dx, lines.y_px - dy, lines.x_px + dx, lines.y_px + dy
-            above, below = model.rows(*self.crossed[:2]), model.rows(*self.crossed[2:])
+            ends = lines.x_px - dx, lines.y_px - dy, lines.x_px + dx, lines.y_px + dy
+            self.crossing = np.array([*ends, np.zeros_like(dx), lines.sigma_rad, lines.sigma_px])
+            above, below = model.rows(*ends[:2]), model.rows(*ends[2:])
             self.later = np.where(np.isfinite(lines.t_s), below - above, 0.0)
             self.line_t = np.nan_to_num(lines.t_s - model.t0_s)
 
@@ -203,7 +206,7 @@ class _Problem:
 
     def _angles(self, motions: np.ndarray) -> np.ndarray:
         """The angle of each of the motions (k, 19) at each position, (k, n)."""
-        return solve_swing(motions, self.t + motions[:, 16:17] * self.rows)[:, 0]
+        return solve_swing(motion_of(motions), self.t + motions[:, 16:17] * self.rows)[:, 0]
 
     def _rest(self, v: np.ndarray, angle: np.ndarray) -> np.ndarray:
         x, y = self.model.see(v, v[9] * angle, self.t + v[16] * self.rows)
@@ -219,30 +222,20 @@ class _Problem:
     def slopes(self, v: np.ndarray, index: list[int]) -> np.ndarray:
         """d rest / d v[index], (r, len(index)): the motion is solved anew only for what moves it."""
         v0 = v[:, None, None]
-        angle = solve_swing(v, self.t + v[16] * self.rows)[0]
+        angle = solve_swing(motion_of(v), self.t + v[16] * self.rows)[0]
         moved = v0 + np.eye(len(NAMES))[:, index][..., None] * self.steps[:, None, None]
         angles = np.tile(angle, (len(index), 1))
-        moving = [row for row, i in enumerate(index) if 4 <= i <= 8 or i == 16]
+        moving = [row for row, i in enumerate(index) if 4 <= i <= 9 or i == 16]
         angles[moving] = self._angles(moved[:, moving, 0].T)
         return ((self._rest(moved, angles) - self._rest(v, angle)) / self.steps[index][:, None]).T
 
     def line_rest(self, v: np.ndarray) -> np.ndarray:
         """How far each line passes the pivot, over its uncertainty there."""
-        assert self.lines is not None
-        k = self.lines
-        ax, ay, bx, by = self.crossed
-        ax, ay = self.model.straight(v, ax, ay)
-        bx, by = self.model.straight(v, bx, by)
         if np.any(v[16]) and np.any(self.later):  # the lower point is seen later: turned back to when the upper one was
             first = v if v.ndim == 1 else v[:, 0, 0]
-            turn = v[9] * solve_swing(first, self.line_t)[1] * v[16] * self.later
-            dx, dy = bx - v[0], by - v[1]
-            bx, by = v[0] + dx - turn * dy, v[1] + dy + turn * dx
-        dx, dy = bx - ax, by - ay
-        size = np.hypot(dx, dy)
-        away = (dy * (v[0] - ax) - dx * (v[1] - ay)) / size
-        reach = np.hypot(v[0] - 0.5 * (ax + bx), v[1] - 0.5 * (ay + by))
-        return np.asarray(away / np.hypot(np.hypot(k.sigma_rad * reach, k.sigma_px), 1e-3))
+            turned = solve_swing(motion_of(first), self.line_t)[1] * self.later
+            return self.model.misses(v, np.array([*self.crossing[:4], turned, *self.crossing[5:]]))
+        return self.model.misses(v, self.crossing)
 
     def weigh(self, inflation: float) -> None:
         """Let all data weigh as their residuals say."""
@@ -267,6 +260,22 @@ class _Problem:
             if not apart or (not near and mode.chi2 < apart[0].chi2 + deep):
                 apart.append(mode)
         return apart
+
+    def along(self, mode: Minimum) -> list[Minimum]:
+        """Where the valley that a mode lies in goes as the camera comes nearer or goes farther: the least with its nearness
+        held. The same keystone is a large tilt from afar or a small one from near, so that the valley bends."""
+        names = tuple(name for name in NAMES if name != "log_nearness")
+        everything = list(range(len(NAMES)))
+        found = []
+        for nearness in _NEARNESSES:
+            start = mode.values.copy()
+            start[[AT["yaw"], AT["pitch"]]] *= np.exp(start[AT["log_nearness"]] - nearness)
+            start[AT["log_nearness"]] = nearness
+            least = self.solve(start, names, 10)
+            if least is not None and least.chi2 < mode.chi2 + _LIKELY:
+                slopes = self.slopes(least.values, everything)
+                found.append(Minimum(least.values, least.rest, slopes.T @ slopes))
+        return found
 
     def trim(self, values: np.ndarray) -> None:
         """Leave out strays, and let the lines weigh as they scatter."""
