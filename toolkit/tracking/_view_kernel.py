@@ -6,12 +6,22 @@ import math
 from typing import Any
 
 from toolkit.motion.kernels.pointer import reals, skip
-from toolkit.tracking._sine import cosine, sine
+from toolkit.tracking._sine import cosine, part, sine
 
 # The caller's places: addresses of the sets of parameters (each in the order of `view.NAMES`), of the picture's middle, and of
-# four lists of COUNT numbers a SET: two that are given, two that are found; then the numbers of sets and points.
+# lists of COUNT numbers a SET, first those given, then those found; then the numbers of sets and points.
 VALUES, MIDDLE, LISTS, SETS, COUNT = range(5)
 _NAMES = 19
+
+
+@part
+def grown(k1: float, far: float) -> float:
+    """By how much the lens takes a place away from the middle that is seen so far from it (squared, over the corner's)."""
+    far = far if far < 4.0 else 4.0
+    grow = 1.0
+    for _ in range(6):
+        grow = 1.0 + k1 * far / (grow * grow)
+    return grow
 
 
 def see(places: Any) -> None:
@@ -57,10 +67,30 @@ def straight(places: Any) -> None:
         y = skip(seen_x, 3 * places[SETS] * count)
         for i in range(count):
             dx, dy = seen_x[i] - mx, seen_y[i] - my
-            far = (dx * dx + dy * dy) / corner
-            far = far if far < 4.0 else 4.0
-            grow = 1.0
-            for _ in range(6):
-                grow = 1.0 + k1 * far / (grow * grow)
+            grow = grown(k1, (dx * dx + dy * dy) / corner)
             x[i] = mx + dx / grow
             y[i] = my + dy / grow
+
+
+def miss(places: Any) -> None:
+    """How far the line through two places passes the pivot, over its uncertainty there; given besides: by how much the second
+    is turned about the pivot, over factor and readout, and the σ of the line's direction and place."""
+    count, middle = places[COUNT], reals(places, MIDDLE)
+    mx, my, stride = middle[0], middle[1], places[SETS] * count
+    corner = mx * mx + my * my
+    for k in range(places[SETS]):
+        v, above_x = skip(reals(places, VALUES), k * _NAMES), skip(reals(places, LISTS), k * count)
+        above_y, below_x, below_y = skip(above_x, stride), skip(above_x, 2 * stride), skip(above_x, 3 * stride)
+        turned, sigma_rad, sigma_px = skip(above_x, 4 * stride), skip(above_x, 5 * stride), skip(above_x, 6 * stride)
+        found = skip(above_x, 7 * stride)
+        x, y, turn, k1 = v[0] - mx, v[1] - my, v[9] * v[16], v[13]
+        for i in range(count):
+            ax, ay, bx, by = above_x[i] - mx, above_y[i] - my, below_x[i] - mx, below_y[i] - my
+            grow_a, grow_b = grown(k1, (ax * ax + ay * ay) / corner), grown(k1, (bx * bx + by * by) / corner)
+            ax, ay = ax / grow_a, ay / grow_a
+            dx, dy, back = bx / grow_b - x, by / grow_b - y, turn * turned[i]
+            bx, by = x + dx - back * dy, y + dy + back * dx
+            dx, dy = bx - ax, by - ay
+            off_x, off_y = x - 0.5 * (ax + bx), y - 0.5 * (ay + by)
+            square = sigma_rad[i] * sigma_rad[i] * (off_x * off_x + off_y * off_y) + sigma_px[i] * sigma_px[i] + 1e-6
+            found[i] = (dy * (x - ax) - dx * (y - ay)) / math.sqrt((dx * dx + dy * dy) * square)
