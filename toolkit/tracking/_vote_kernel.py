@@ -8,10 +8,10 @@ from typing import Any
 from toolkit.motion.kernels.pointer import pixels, reals, skip, wholes
 
 # The caller's places: addresses of the edge pixels (five lists: column, row, gradient's direction x and y, weight), of the
-# numbers (signed distance of the centre, size of a bin), of the table of bins, of room for each pixel's bin, and of the
-# result (two rows: column, row, votes); then how many pixels there are, and rows and columns of the table. The table is
-# all zero before and after.
-EDGES, NUMBERS, TABLE, BINS, FOUND, COUNT, HEIGHT, WIDTH = range(8)
+# numbers (two lists: signed distances of the centre, sizes of a bin), of the table of bins, of room for each pixel's bin, and
+# of the result (two rows a distance: column, row, votes); then how many pixels and distances there are, and rows and columns
+# of the picture. The table is all zero before and after.
+EDGES, NUMBERS, TABLE, BINS, FOUND, COUNT, REACHES, ROWS, COLUMNS = range(9)
 
 
 def vote(places: Any) -> None:
@@ -22,47 +22,49 @@ def vote(places: Any) -> None:
         wholes(places, BINS),
         reals(places, FOUND),
     )
-    reach, size = reals(places, NUMBERS)[0], reals(places, NUMBERS)[1]
-    count, height, width = places[COUNT], places[HEIGHT], places[WIDTH]
+    count = places[COUNT]
     rows, nx, ny = skip(columns, count), skip(columns, 2 * count), skip(columns, 3 * count)
     weight = skip(columns, 4 * count)
-    for i in range(count):
-        u = math.floor((columns[i] + reach * nx[i]) / size + 0.5) + 1
-        v = math.floor((rows[i] + reach * ny[i]) / size + 0.5) + 1
-        bins[i] = 0
-        if 0 < u < width - 1 and 0 < v < height - 1:
-            bins[i] = v * width + u
-            table[bins[i]] += weight[i]
-    apart = math.floor(abs(reach) / size) + 1
-    for which in range(2):
-        best, at = -1.0, 0
+    for k in range(places[REACHES]):
+        reach, size = reals(places, NUMBERS)[k], reals(places, NUMBERS)[places[REACHES] + k]
+        height, width = math.floor(places[ROWS] / size) + 3, math.floor(places[COLUMNS] / size) + 3
         for i in range(count):
-            here = bins[i]
-            if table[here] > 0.0:
-                total = 0.0
-                for b in range(-1, 2):
-                    for a in range(-1, 2):
-                        total += table[here + b * width + a]
-                if total > best or (total == best and here < at):
-                    best, at = total, here
-        if at == 0:
-            break
-        at_v = at // width
-        at_u = at - at_v * width
-        sum_u = sum_v = total = 0.0
-        for b in range(-1, 2):
-            for a in range(-1, 2):
-                w = table[at + b * width + a]
-                sum_u += w * (at_u + a)
-                sum_v += w * (at_v + b)
-                total += w
-        found[3 * which] = (sum_u / total - 1) * size
-        found[3 * which + 1] = (sum_v / total - 1) * size
-        found[3 * which + 2] = total
-        for i in range(count):  # the second is another one
-            v = bins[i] // width
-            u = bins[i] - v * width
-            if -apart <= v - at_v <= apart and -apart <= u - at_u <= apart:
-                table[bins[i]] = 0.0
-    for i in range(count):
-        table[bins[i]] = 0.0
+            u = math.floor((columns[i] + reach * nx[i]) / size + 0.5) + 1
+            v = math.floor((rows[i] + reach * ny[i]) / size + 0.5) + 1
+            bins[i] = 0
+            if 0 < u < width - 1 and 0 < v < height - 1:
+                bins[i] = v * width + u
+                table[bins[i]] += weight[i]
+        apart = math.floor(abs(reach) / size) + 1
+        for which in range(2):
+            best, at = -1.0, 0
+            for i in range(count):
+                here = bins[i]
+                if table[here] > 0.0:
+                    total = 0.0
+                    for b in range(-1, 2):
+                        for a in range(-1, 2):
+                            total += table[here + b * width + a]
+                    if total > best or (total == best and here < at):
+                        best, at = total, here
+            if at == 0:
+                break
+            at_v = at // width
+            at_u = at - at_v * width
+            sum_u = sum_v = total = 0.0
+            for b in range(-1, 2):
+                for a in range(-1, 2):
+                    w = table[at + b * width + a]
+                    sum_u += w * (at_u + a)
+                    sum_v += w * (at_v + b)
+                    total += w
+            found[6 * k + 3 * which] = (sum_u / total - 1) * size
+            found[6 * k + 3 * which + 1] = (sum_v / total - 1) * size
+            found[6 * k + 3 * which + 2] = total
+            for i in range(count):  # the second is another one
+                v = bins[i] // width
+                u = bins[i] - v * width
+                if -apart <= v - at_v <= apart and -apart <= u - at_u <= apart:
+                    table[bins[i]] = 0.0
+        for i in range(count):
+            table[bins[i]] = 0.0

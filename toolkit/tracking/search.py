@@ -7,6 +7,7 @@ Bobs collect a whole circle of votes, strings and soft shadows do not. Votes nee
 
 from __future__ import annotations
 
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +61,10 @@ def silhouette(image: np.ndarray, back: np.ndarray) -> np.ndarray:
 
 def rim_level(picture: np.ndarray) -> float:
     """The median of its outermost pixels."""
-    return float(np.median(np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])))
+    rim = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])
+    low, high = (rim.size - 1) // 2, rim.size // 2
+    rim.partition((low, high))  # a tenth of the time of `np.median`
+    return float(0.5 * (rim[low] + rim[high]))
 
 
 def even_light(samples: list[np.ndarray]) -> list[np.ndarray]:
@@ -88,26 +92,28 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 24) ->
     table = _table(stack.shape[1:], 1.0)
     biggest = 0.2 * min(stack.shape[1:])
     radii = [r for r in 2.5 * 1.25 ** np.arange(16) if r <= biggest]
+    reaches = np.array([(sign * r, max(1.0, r / 7)) for r in radii for sign in (-1, 1)]).reshape(-1, 2)
+    here = np.nonzero(moving)
     for k, picture in enumerate(samples):
-        gx = cv2.Sobel(picture, cv2.CV_32F, 1, 0, scale=0.125)
-        gy = cv2.Sobel(picture, cv2.CV_32F, 0, 1, scale=0.125)
+        gx = cv2.Sobel(picture, cv2.CV_32F, 1, 0, scale=0.125)[here]
+        gy = cv2.Sobel(picture, cv2.CV_32F, 0, 1, scale=0.125)[here]
         size = np.hypot(gx, gy)
-        rows, columns = np.nonzero((moving > 0) & (size > max(2.0, 2 * noise)))
-        if rows.size < 8:
+        strong = np.flatnonzero(size > max(2.0, 2 * noise))
+        if strong.size < 8:
             continue
-        length = size[rows, columns]
-        if rows.size > 4000:
+        length = size[strong]
+        if strong.size > 4000:
             keep = np.argpartition(length, -4000)[-4000:]
-            rows, columns, length = rows[keep], columns[keep], length[keep]
+            strong, length = strong[keep], length[keep]
         weight = np.sqrt(length / np.percentile(length, 90)).clip(0, 1)
-        edges = np.array([columns, rows, gx[rows, columns] / length, gy[rows, columns] / length, weight], float)
-        for radius in radii:
-            bin_size = max(1.0, radius / 7)
-            for sign in (-1, 1):
-                for x, y, votes in _vote(edges, sign * radius, bin_size, picture.shape, table):
-                    score = votes / (2 * np.pi * radius)
-                    u, v = (x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5
-                    found.append(Hypothesis(k, u, v, radius * factor, sign, score))
+        rows, columns = (line[strong] for line in here)
+        edges = np.array([columns, rows, gx[strong] / length, gy[strong] / length, weight], float)
+        for (reach, _), both in zip(reaches.tolist(), _vote(edges, reaches, picture.shape, table).tolist()):
+            radius, sign = abs(reach), 1 if reach > 0 else -1
+            for x, y, votes in both:
+                score = votes / (2 * np.pi * radius)
+                u, v = (x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5
+                found.append(Hypothesis(k, u, v, radius * factor, sign, score))
     found.sort(key=lambda h: -h.score)
     return _distinct(found, most)
 
@@ -134,7 +140,8 @@ def find_round_near(
     nx, ny = gx[rows, columns] / length, gy[rows, columns] / length
     bin_size = max(1.0, radius_px / 7)
     edges = np.array([columns, rows, nx, ny, weight], float)
-    x, y, votes = _vote(edges, sign * radius_px, bin_size, picture.shape, _table(picture.shape, bin_size))[0]
+    how = np.array([[sign * radius_px, bin_size]])
+    x, y, votes = _vote(edges, how, picture.shape, _table(picture.shape, bin_size))[0, 0].tolist()
     x, y = _centred(x, y, columns, rows, -sign * nx, -sign * ny, weight, radius_px)
     return x, y, votes / (2 * np.pi * radius_px)
 
@@ -176,35 +183,30 @@ def _distinct(found: list[Hypothesis], most: int) -> list[Hypothesis]:
     for h in found:
         if len(kept) == most:
             break
+        if any(o.sample == h.sample and hypot(o.x_px - h.x_px, o.y_px - h.y_px) < h.radius_px for o in kept):
+            continue
         alike = [o for o in kept if o.sign == h.sign and 0.75 < o.radius_px / h.radius_px < 1.34]
-        same = any(np.hypot(o.x_px - h.x_px, o.y_px - h.y_px) < h.radius_px and o.sample == h.sample for o in kept)
         rivals = sum(any(o.sample == r.sample and r.score > o.score for r in alike) for o in alike)
         second = any(o.sample == h.sample for o in alike)
-        if not same and (rivals if second else len(alike) - rivals) < 3:
+        if (rivals if second else len(alike) - rivals) < 3:
             kept.append(h)
     return kept
 
 
-def _vote(
-    edges: np.ndarray, reach: float, bin_size: float, shape: tuple[int, ...], table: np.ndarray
-) -> list[tuple[float, float, float]]:
-    """The two centres (shrunken px) with most votes at signed distance `reach` along the gradient, and how many each has.
+def _vote(edges: np.ndarray, reaches: np.ndarray, shape: tuple[int, ...], table: np.ndarray) -> np.ndarray:
+    """The two centres (shrunken px) with most votes at each signed distance along the gradient, and how many each has: (r, 2, 3).
 
-    edges : (5, n) the edge pixels' columns, rows, directions of the gradient (x, y) and weights.    table : all zero, and
-    left so.
+    edges : (5, n) the edge pixels' columns, rows, directions of the gradient (x, y) and weights.    reaches : (r, 2) signed
+    distances and the bins' sizes.    table : all zero, and left so.
     """
-    height, width = _bins(shape, bin_size)
-    bins = np.empty(edges.shape[1], np.int64)
-    numbers, found = np.array([reach, bin_size]), np.zeros((2, 3))
+    bins, numbers = np.empty(edges.shape[1], np.int64), np.array(reaches.T, float, order="C")
+    found = np.zeros((len(reaches), 2, 3))
     vote = kernel("vote", "toolkit.tracking._vote_kernel", "the search")
-    call(vote, *(address(a) for a in (edges, numbers, table, bins, found)), edges.shape[1], height, width)
-    return [(x, y, votes) for x, y, votes in found.tolist()]
-
-
-def _bins(shape: tuple[int, ...], bin_size: float) -> tuple[int, int]:
-    return int(shape[0] / bin_size) + 3, int(shape[1] / bin_size) + 3
+    arrays = edges, numbers, table, bins, found
+    call(vote, *(address(a) for a in arrays), edges.shape[1], len(reaches), *shape)
+    return found
 
 
 def _table(shape: tuple[int, ...], bin_size: float) -> np.ndarray:
     """Room for the votes in a picture of this shape, and bins of this size or larger."""
-    return np.zeros(_bins(shape, bin_size), np.float32)
+    return np.zeros((int(shape[0] / bin_size) + 3, int(shape[1] / bin_size) + 3), np.float32)

@@ -113,18 +113,23 @@ def _pixels(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Some pixels of the patches but for the string: places relative to the guess, picture, background, and whether that was
     seen there."""
-    taken = [np.empty((5, 0))]
+    bare = []
     for patch, guess in seen:
-        rows, columns = np.indices(patch.image.shape)
+        rows, columns = np.ogrid[: patch.image.shape[0], : patch.image.shape[1]]
         u, v = columns + patch.x_px - guess.x_px, rows + patch.y_px - guess.y_px
         held = np.isfinite(guess.string_rad)
         ux, uy = (float(f(guess.string_rad)) if held else 0.0 for f in (np.cos, np.sin))
         along, across = u * ux + v * uy, np.abs(u * uy - v * ux)
-        bare = (along < 0.5 * look.radius_px) | (across > 5 + 0.1 * look.radius_px)
-        taken.append(np.stack([u, v, patch.image, patch.back, patch.seen > 0])[:, bare])
-    table = np.concatenate(taken, axis=1)
-    u, v, image, back, beside = table[:, :: max(1, table.shape[1] // _PIXELS)]
-    return u, v, image, back, beside > 0
+        bare.append(np.argwhere((along < 0.5 * look.radius_px) | (across > 5 + 0.1 * look.radius_px)))
+    every = max(1, sum(len(places) for places in bare) // _PIXELS)
+    taken, passed = [np.empty((5, 0))], 0
+    for (patch, guess), places in zip(seen, bare):
+        rows, columns = places[-passed % every :: every].T
+        passed += len(places)
+        u, v = columns + patch.x_px - guess.x_px, rows + patch.y_px - guess.y_px
+        taken.append(np.array([u, v, *(picture[rows, columns] for picture in (patch.image, patch.back, patch.seen))]))
+    u, v, image, back, times = np.concatenate(taken, axis=1)
+    return u, v, image, back, times > 0
 
 
 def _light_is_missed(
