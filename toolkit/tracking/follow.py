@@ -62,13 +62,13 @@ class Follower(Known):
         self._shade_scatter = 0.03 * abs(rough.look.contrast)
         self.first: list[Frame] = []  # the frames read ahead, if they are the first that will be followed
         self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
-        self._picture: np.ndarray | None = None  # the one that is measured, thinned
+        self._picture: Frame | None = None  # the one that is measured
         self._unlike_seen = (
             np.nan
         )  # how much of a bob with a pattern differs from what stands still, at the place judged last
         self._usually_unlike = np.nan  # and lately
         self._speed = 0.0  # of the bob on it, px/s
-        self._lit: tuple[float, np.ndarray] = (np.nan, np.empty(0))  # the bob's brightness lately, and the picture's
+        self._lit: tuple[float, Frame | None] = (nan, None)  # the bob's brightness lately, and on which picture
 
     def follow(self, frame: Frame) -> None:
         """Measure one frame, in the order of the file."""
@@ -77,8 +77,8 @@ class Follower(Known):
         if (self.hidden or len(self.recent) < 3) and frame.index in self.found:
             # the motion fitted to the start may be poor at its rim
             guess = self._guess(*self.found[frame.index], guess.streak_x_px, guess.streak_y_px)
-        before, self._picture = self._picture, thinned(frame)
-        repeated = before is not None and alike(before, self._picture)
+        before, self._picture = self._picture, frame
+        repeated = before is not None and alike(before, frame)
         place, patch = (NOWHERE, None) if repeated else self._measure(frame, guess)
         r = self.record
         r.index.append(frame.index)
@@ -210,14 +210,16 @@ class Follower(Known):
             return seen / light
         shade = min((seen / light, seen), key=lambda s: abs(s - self._shade))
         before, picture = self._lit
-        if abs(shade - self._shade) < 0.1 * abs(self.look.contrast) or isnan(before) or self._picture is None:
+        if abs(shade - self._shade) < 0.1 * abs(self.look.contrast) or picture is None or self._picture is None:
             return shade
-        whole = float(np.median(self._picture / np.maximum(picture, 1.0)))
+        whole = float(np.median(thinned(self._picture) / np.maximum(thinned(picture), 1.0)))
         return min(shade, self._shade * seen / max(before * whole, 1.0), key=lambda s: abs(s - self._shade))
 
     def _least_visible(self) -> float:
         """How much of the outline must be seen of a bob as fast as it is now."""
-        return float(np.interp(self._speed, *self.ordinary_visible))
+        (slow, fast), (at_slow, at_fast) = self.ordinary_visible
+        part = (self._speed - slow) / (fast - slow) if fast > slow else 1.0
+        return at_slow + (at_fast - at_slow) * min(max(part, 0.0), 1.0)
 
     def _believe(self, patch: Patch, place: Place, guess: Guess) -> bool:
         look = self.look
@@ -297,7 +299,7 @@ class Follower(Known):
                 self.recent.append((frame.t_s, r.place[k].x_px, r.place[k].y_px))
                 self.hidden = 0
             elif self.recent and not r.repeated[k]:
-                self._picture = thinned(frame)
+                self._picture = frame
                 place, patch = self._measure(frame, self._ahead(frame))
                 if patch is not None:
                     r.place[k], r.ok[k] = place, True
@@ -322,7 +324,7 @@ class Follower(Known):
         if recent and abs(t - self.swing.t0_s) > 1.0:  # start anew from near by, so that no long way is integrated
             self.swing = replace(self.swing, values=self.swing.values_at(recent[-1][0]), t0_s=recent[-1][0])
         v = self.swing.values.tolist()
-        theta, rate = (a.tolist() for a in self.swing.angle(np.array([*(r[0] for r in recent), t])))
+        theta, rate = self.swing.angles_at([*(r[0] for r in recent), t])
         if not isfinite(sum(theta) + rate[-1]):  # a motion fitted to too little may run away
             x, y = recent[-1][1:] if recent else v[:2]
             return x, y, 0.0, 0.0
