@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from toolkit.calibrate import calibrate
 from toolkit.render import stage
 from toolkit.scene import Scene
 from toolkit.track import Track
-from toolkit.tracking.clock import lone_strays, out_of_time, place_lost_frames, strays_told
+from toolkit.tracking.clock import lone_strays, out_of_time, place_lost_frames, strays_told, timed_swing
 from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.tracking.view import AT
@@ -197,6 +199,25 @@ def test_a_lost_frame_is_placed_where_the_motion_leaps():
     assert better.rms_px < 0.06
     same, _ = place_lost_frames(placed(true, x, y), better, [])
     np.testing.assert_array_equal(same.t_s, true)
+
+
+@pytest.mark.parametrize(("fraction", "theta0"), [(0.05, 0.3), (0.18, 0.6)])
+def test_frames_lost_again_and_again_are_all_counted(fraction, theta0):
+    """A camera that loses frames by chance and counts on: each comes to its own time."""
+    lossy = {"dropped_frames": {"fraction": fraction, "stamps": "counted"}}
+    _, truth, (stamps, x, y) = seen(theta0, False, **lossy)
+    true = truth.t_s - truth.t_s[0]
+    assert true[-1] > (1 + 0.5 * fraction) * stamps[-1]
+    start = start_swing(stamps[:60], x[:60], y[:60])
+    followed = fit_swing(stamps[:60], x[:60], y[:60], np.full(60, 0.1), start)
+    warned: list[str] = []
+    found, swing = timed_swing(followed, placed(stamps, x, y), Path("clip"), warned)
+    assert [w.key for w in warned] == ["track.lost_frames"]
+    speed = np.abs(np.gradient(truth.theta_rad, true))
+    fast = speed > 0.3 * speed.max()  # a bob at rest shows no time
+    late = (found.t_s - true)[fast]
+    np.testing.assert_allclose(late, late[0], atol=1e-6)
+    assert 2 * np.pi / swing.period_s == pytest.approx(np.sqrt(9.81 / 0.6), rel=2e-3)
 
 
 def test_frames_are_not_placed_where_more_is_amiss():

@@ -17,7 +17,7 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
-from toolkit.tracking.clock import even_times, lone_strays, out_of_time, place_lost_frames, slips_told, strays_told
+from toolkit.tracking.clock import even_times, lone_strays, out_of_time, slips_told, strays_told, timed_swing
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.joint import Camera, fit_jointly
 from toolkit.tracking.places import Places
@@ -26,7 +26,6 @@ from toolkit.tracking.shake import Shake
 from toolkit.tracking.string_line import seen_half
 from toolkit.tracking.verdict import poor_motion, poor_picture, require_pendulum
 from toolkit.tracking.view_fit import Lines
-from toolkit.tracking.whole_swing import whole_swing
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
@@ -229,8 +228,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     stamps = places.t_s
 
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
-    swing = whole_swing(followed, places, video.path)
-    places, swing = place_lost_frames(places, swing, warnings)
+    places, swing = timed_swing(followed, places, video.path, warnings)
     require_pendulum(swing, places, size_px, video.path)
     places = places.without(out_of_time(places, swing, log, warnings))
     stray = lone_strays(places, *swing.position(places.t_s))

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from toolkit.sentence import said
 from toolkit.tracking.places import Places
+from toolkit.tracking.recount import count_lost
 from toolkit.tracking.swing import Swing, fit_swing
+from toolkit.tracking.whole_swing import whole_swing
 from toolkit.video import Video
 
 _LEFT_OUT = 0.12  # so many frames at another time than their stamp, left out, leave a clock that is sound else
 _STRAY = 8.0  # of its neighbours' robust standard deviation: so far a single frame is not measured right
 _LEAST_PX = 0.1  # and no less than this
+_ROUNDS = 6  # of looking for lost frames
 _PLACED = 0.01  # of the swing's extent: how far places may still stray where lost frames are placed
 
 
@@ -95,46 +99,64 @@ def out_of_time(places: Places, swing: Swing, log: list[str], warnings: list[str
     return leap | repeats
 
 
+def timed_swing(followed: Swing, places: Places, path: Path, warnings: list[str]) -> tuple[Places, Swing]:
+    """The motion over the whole clip from the one followed, and the places at times with the frames put back that a camera
+    lost without a gap in its stamps. Raises JobError where no pendulum's motion goes through the places."""
+    counted = count_lost(places, followed.values_at(places.t_s[places.good][0]))
+    if counted is not None and counted[1].rms_px <= _PLACED * places.extent_px:
+        warnings.append(_lost_told(places.t_s, counted[0].t_s))
+        return counted
+    return place_lost_frames(places, whole_swing(followed, places, path), warnings)
+
+
 def place_lost_frames(places: Places, swing: Swing, warnings: list[str]) -> tuple[Places, Swing]:
-    """The places at times with the frames put back that a camera lost without a gap in its stamps, and the motion fitted to
-    them.
+    """The places at times with the frames put back that the motion shows to be lost, and the motion fitted to them."""
+    now, motion = _placed(places, swing)
+    if now is places or motion.rms_px > _PLACED * places.extent_px:
+        return places, swing  # nothing is lost, or too much is amiss to know what was lost where
+    warnings.append(_lost_told(places.t_s, now.t_s))
+    return now, motion
+
+
+def _placed(places: Places, swing: Swing) -> tuple[Places, Swing]:
+    """The same with frames put back where the motion leaps, as long as it fits the better for it.
 
     A lost frame shows as a leap of the motion by one frame's time, for good; nothing else does that. A leap backwards is
     believed where a picture repeats the one before, else it is left to `slips_told`.
     """
-    stamps = places.t_s
-    step = float(np.median(np.diff(stamps)))
+    step = float(np.median(np.diff(places.t_s)))
     some = places.some()
     x, y = places.x_px[some], places.y_px[some]
     now, motion = places, swing
-    when: list[float] = []
-    for _ in range(6):
+    for _ in range(_ROUNDS):
         lost = [
             (k, f)
             for k, f in _for_good(clock_slips(now, motion, *motion.position(now.t_s)))
             if f > 0 or (f > -1.3 and places.repeated[max(0, k - 1) : k + 1].any())
         ]
+        if not lost:
+            break
         moved = now.t_s.copy()
         for k, frames in lost:
             moved[k:] += frames * step
-        better = fit_swing(moved[some], x, y, np.full(some.size, 0.1), motion.values) if lost else None
+        better = fit_swing(moved[some], x, y, np.full(some.size, 0.1), motion.values)
         if better is None or better.rms_px > motion.rms_px:
             break
         now, motion = replace(now, t_s=moved), better
-        when += [float(stamps[k]) for k, _ in lost]
-    if not when or motion.rms_px > _PLACED * places.extent_px:
-        return places, swing  # nothing is lost, or too much is amiss to know what was lost where
-    warnings.append(
-        said(
-            "track.lost_frames",
-            "the camera lost or repeated frames at {frames} place(s) that the time stamps do not tell of (t = {places} s): the "
-            "motion leaps there by whole frames; times after them were moved by as much, {share:+.2%} over the clip",
-            frames=len(when),
-            places=", ".join(f"{w:.2f}" for w in sorted(when)[:8]),
-            share=float((now.t_s[-1] - stamps[-1]) / (stamps[-1] - stamps[0])),
-        )
-    )
     return now, motion
+
+
+def _lost_told(stamps: np.ndarray, t_s: np.ndarray) -> str:
+    """A sentence on the frames that were put back: the times (n,) as stamped and as they are."""
+    where = np.flatnonzero(np.abs(np.diff(t_s - stamps)) > 1e-6) + 1
+    return said(
+        "track.lost_frames",
+        "the camera lost or repeated frames at {frames} place(s) that the time stamps do not tell of (t = {places} s): the "
+        "motion leaps there by whole frames; times after them were moved by as much, {share:+.2%} over the clip",
+        frames=int(where.size),
+        places=", ".join(f"{stamps[k]:.2f}" for k in where[:8]),
+        share=float((t_s[-1] - stamps[-1]) / (stamps[-1] - stamps[0])),
+    )
 
 
 def lone_strays(places: Places, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
