@@ -11,9 +11,12 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from toolkit.motion.compiled import keeps_objects
 from toolkit.tracking.background import Background
+from toolkit.tracking.repeat import alike
 from toolkit.tracking.stillness import Anchors
 from toolkit.tracking.string_line import measure_string
-from toolkit.tracking.swing import solve_swing
+from toolkit.tracking.swing import Swing, solve_swing
+from toolkit.tracking.view import NAMES, View
+from toolkit.video import Frame
 
 ROOT = Path(__file__).parents[1]
 
@@ -32,6 +35,68 @@ def test_motions_solved_at_once_are_those_that_scipy_finds():
         truth = solve_ivp(law, (0, 3), motion[7:], t_eval=times, rtol=1e-10, atol=1e-12).y
         np.testing.assert_allclose([theta, rate], truth, atol=2e-5)
     np.testing.assert_array_equal(solve_swing(motions[1], t[1]), found[1])
+
+
+def test_more_motions_than_are_integrated_side_by_side_and_a_few_times():
+    rng = np.random.default_rng(7)
+    motions = np.array([0, 0, 500, 0, 18, 0.05, 0.1, 2.9, 0.3]) * rng.uniform(0.9, 1.1, (11, 9))
+    t = np.sort(rng.uniform(-1, 9, (11, 30)), axis=1)
+    for motion, times, both in zip(motions, t, solve_swing(motions, t), strict=True):
+        np.testing.assert_array_equal(solve_swing(motion, times), both)
+        swing = Swing(motion, np.zeros((9, 9)), 0.25, 0.0)
+        np.testing.assert_array_equal(swing.angles_at([*times[:3] + 0.25]), swing.angle(times[:3] + 0.25))
+
+
+def _view(k1: float, readout: float = 0.0) -> View:
+    values = {"pivot_x": 640, "pivot_y": 60, "length": 550, "vertical": 0.02, "omega2": 17.8, "factor": 1.01, "yaw": 0.12,
+              "pitch": -0.07, "log_nearness": -0.7, "k1": k1, "sway_sin": 0.03, "sway_cos": -0.02, "readout": readout}  # fmt: skip
+    v = np.array([values.get(name, 0.0) for name in NAMES], float)
+    return View(v, np.zeros(0), np.zeros(0), np.zeros(0), (), (639.5, 359.5), 0.0, 1.0)
+
+
+def test_a_camera_shows_what_its_geometry_says():
+    view, t = _view(0.03), np.linspace(0, 20, 77)
+    theta = 0.9 * np.cos(4.1 * t)
+    sway = 0.03 * np.sin(np.sqrt(17.8) * t) - 0.02 * np.cos(np.sqrt(17.8) * t)
+    bob = 550 * np.array([np.cos(sway) * np.sin(theta + 0.02), np.cos(sway) * np.cos(theta + 0.02), np.sin(sway)])
+    (cy, sy), (cp, sp) = ((np.cos(a), np.sin(a)) for a in (0.12, -0.07))
+    x, y, z = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]]) @ np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ bob
+    near = 1 + np.exp(-0.7) / (2 * 639.5) * z
+    x, y = (640 - 639.5 + x) / near, (60 - 359.5 + y) / near
+    grow = 1 + 0.03 * (x**2 + y**2) / (639.5**2 + 359.5**2)
+    seen = view.see(view.values, theta, t)
+    np.testing.assert_allclose(seen, [639.5 + x * grow, 359.5 + y * grow], atol=1e-9)
+    several = view.see(
+        np.stack([view.values, _view(0.0).values])[..., None].swapaxes(0, 1), np.stack([theta, theta]), t
+    )
+    np.testing.assert_array_equal(np.array(several)[:, 0], seen)
+    np.testing.assert_allclose(view.straight(view.values, *seen), [639.5 + x, 359.5 + y], atol=1e-3)
+
+
+def test_lines_miss_a_pivot_by_their_distance_over_its_uncertainty():
+    view, rng = _view(0.0, readout=0.01), np.random.default_rng(8)
+    ends, turned = rng.uniform(0, 700, (4, 25)), rng.normal(0, 2, 25)
+    direction, place = rng.uniform(1e-3, 1e-2, 25), rng.uniform(0.1, 1, 25)
+    pivot, turn = np.array([[640.0], [60.0]]), 1.01 * 0.01 * turned
+    a, b = ends[:2], ends[2:] - pivot
+    b = pivot + np.array([b[0] - turn * b[1], b[1] + turn * b[0]])
+    along = (b - a) / np.linalg.norm(b - a, axis=0)
+    away = along[1] * (pivot - a)[0] - along[0] * (pivot - a)[1]
+    reach = np.linalg.norm(pivot - (a + b) / 2, axis=0)
+    expected = away / np.sqrt((direction * reach) ** 2 + place**2)
+    found = view.misses(view.values, np.array([*ends, turned, direction, place]))
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-9)
+
+
+def test_pictures_alike_but_for_one_pixel_between_the_rows_looked_at_first():
+    rng = np.random.default_rng(9)
+    luma = rng.integers(20, 230, (300, 400)).astype(np.uint8)
+    rounded, other, far = luma + 1, luma.copy(), luma.copy()
+    other[20, 36] += 9
+    far[4, 4] += 9
+    one = Frame(0, 0.0, luma, lambda _: None)
+    told = [alike(one, Frame(1, 0.1, picture, lambda _: None)) for picture in (luma, rounded, other, far)]
+    assert told == [True, True, False, False]
 
 
 def test_background_is_the_mean_of_what_neither_bob_nor_string_hides():

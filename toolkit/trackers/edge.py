@@ -99,7 +99,10 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
     else:
         return None
     sigma = np.sqrt(_TIED * variance)
-    within = profile[:, (r < -0.5 - edge) & (r > -3.0 - edge)].mean(axis=1)
+    deep = (r < -0.5 - edge) & (r > -3.0 - edge)
+    if not deep.any():
+        return None  # so soft an edge that the rays begin within it: they do not tell the bob from what is beyond
+    within = profile[:, deep].mean(axis=1)
     beyond = profile[:, -3:].mean(axis=1)
     seen = inside & (apart < 2 * _FAR) & (np.abs(within - beyond) > max(0.12, 3 * noise))
     if seen.sum() < 10:
