@@ -55,3 +55,17 @@ def test_a_pendulum_is_let_through(pendulum):
 def test_what_is_no_pendulum_is_refused_with_the_reason(motion, why):
     with pytest.raises(JobError, match=why):
         judge(**motion)
+
+
+@pytest.mark.parametrize(("away", "refused"), [(0.0, False), (12.0, True)])
+def test_an_ellipse_before_a_tilted_camera_is_a_swing_but_not_what_leaps_about_it(away, refused):
+    swing = Swing(np.array([320.0, 20.0, 400.0, 0.0, 20.0, 0.0, 0.0, 0.1, 0.0]), np.zeros((9, 9)), 0.0, 7.0)
+    phase = np.sqrt(20.0) * TIMES
+    x, y = 320 + 40 * np.cos(phase), 420 + 10 * np.sin(phase) + away * np.random.default_rng(1).normal(size=TIMES.size)
+    sigma, good = np.full(TIMES.size, 0.02), np.ones(TIMES.size, bool)
+    places = Places(TIMES, x, y, sigma, sigma, good, ~good)
+    if refused:
+        with pytest.raises(JobError, match="strays"):
+            require_pendulum(swing, places, SIZE_PX, Path("clip.mp4"))
+    else:
+        require_pendulum(swing, places, SIZE_PX, Path("clip.mp4"))

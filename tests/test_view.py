@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from toolkit.scene import Scene
 from toolkit.track import Track
 from toolkit.tracking.clock import lone_strays, out_of_time, place_lost_frames, strays_told, timed_swing
 from toolkit.tracking.places import Places
+from toolkit.tracking.shake import Shake
+from toolkit.tracking.stillness import CameraShift
 from toolkit.tracking.swing import Swing, fit_swing, start_swing
 from toolkit.tracking.view import AT
 from toolkit.tracking.view_fit import Lines, fit_view
@@ -266,6 +269,28 @@ def test_a_repeated_picture_near_a_turning_point_is_left_out():
     left_out = out_of_time(placed(t, x, y), swing, [], [])
     assert set(slow) <= set(np.flatnonzero(left_out).tolist())
     assert left_out.sum() <= len(slow) + 2
+
+
+@pytest.mark.parametrize("real", [True, False])
+def test_a_shake_without_which_the_bob_swings_more_evenly_was_none(real):
+    t = np.arange(240) / 60
+    angle = 0.4 * np.cos(4.1 * t)
+    sway = 0.4 * np.sin(1.7 * t)  # what the background seemed to tell of the camera
+    rng = np.random.default_rng(3)
+    x, y = 320 + 400 * np.sin(angle) + sway * real, 20 + 400 * np.cos(angle)
+    x, y = (p + rng.normal(0, 0.02, t.size) for p in (x, y))
+    shifts = [CameraShift(s, 0.0, 0.0, 0.003, 320.0, 240.0) for s in sway]
+    record = SimpleNamespace(
+        index=list(range(t.size)), shift=shifts, place=[SimpleNamespace(x_px=a, y_px=b) for a, b in zip(x, y)]
+    )
+    shake = Shake(SimpleNamespace(record=record, shaking=True, checks={}), np.ones(t.size, bool))
+    still = placed(t, x - shake.x, y - shake.y)
+    swing = fit_swing(t, still.x_px, still.y_px, np.full(t.size, 0.1), start_swing(t, x, y))
+    found, motion = shake.checked(still, swing)
+    np.testing.assert_allclose(found.x_px, x - sway * real, atol=0.01)
+    assert shake.taken is real
+    assert len(shake.told()) == real
+    assert motion.rms_px < 0.1  # the sway alone is 0.28
 
 
 def test_single_frames_far_from_those_about_them_are_left_out_and_a_slow_error_is_not():

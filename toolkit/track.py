@@ -223,12 +223,15 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     time_sigma = video.tick_s / np.sqrt(12) if video.tick_s > 2e-4 and not log else 0.0
     places = Places.of(record, t - t[0])
     _require_seen(places, video)
-    shake = Shake(follower, places.good, log)
+    shake = Shake(follower, places.good)
     places = replace(places, x_px=places.x_px + shake.raw_x - shake.x, y_px=places.y_px + shake.raw_y - shake.y)
     stamps = places.t_s
 
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
     places, swing = timed_swing(followed, places, video.path, warnings)
+    if shake.taken:
+        places, swing = shake.checked(places, swing)
+    log += shake.told()
     require_pendulum(swing, places, size_px, video.path)
     places = places.without(out_of_time(places, swing, log, warnings))
     stray = lone_strays(places, *swing.position(places.t_s))

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from toolkit.sentence import said
 from toolkit.tracking.follow import Follower
+from toolkit.tracking.places import Places
 from toolkit.tracking.stillness import CameraShift
+from toolkit.tracking.swing import Swing, fit_swing
 
+_EVENER = 0.7  # times what places stray from a swing: less, without the shake, and there was none
 _CHECKS = 4  # looks at the background that it takes to say that the camera stood still
 
 
@@ -18,11 +23,12 @@ class Shake:
     frame `sigma` (n,) px. `taken` is False where the camera stood still as far as could be seen; then it may have moved by `unseen_px`.
     """
 
-    def __init__(self, follower: Follower, good: np.ndarray, log: list[str]) -> None:
+    def __init__(self, follower: Follower, good: np.ndarray) -> None:
         r = follower.record
         n = len(r.index)
         self.raw_x, self.raw_y, self.sigma = np.zeros(n), np.zeros(n), np.zeros(n)
         self.x, self.y = self.raw_x, self.raw_y
+        self.extent_px = np.zeros(2)
         self.taken = follower.shaking
         checks = [np.hypot(s.x_px, s.y_px) + 3 * s.sigma_px for s in follower.checks.values()]
         self.unseen_px = float(np.max(checks)) if len(checks) >= _CHECKS and not self.taken else np.inf
@@ -45,17 +51,36 @@ class Shake:
             if k >= first:
                 self.raw_x[k], self.raw_y[k] = r.shift[k].at(*where)  # type: ignore[union-attr]
         self.sigma = np.full(n, noise)
-        extent = np.ptp(shifts, axis=0)
-        log.append(
+        self.extent_px = np.ptp(shifts, axis=0)[:2]
+
+    def told(self) -> list[str]:
+        """A sentence on the shake that was taken away, if any."""
+        if not (self.taken and self.extent_px.any()):
+            return []
+        return [
             said(
                 "track.shake",
                 "The camera moved by up to {across_px:.1f} px across and {down_px:.1f} px down; this was measured on the still "
                 "background (to {noise_px:.3f} px a frame) and taken away.",
-                across_px=float(extent[0]),
-                down_px=float(extent[1]),
-                noise_px=float(noise),
+                across_px=float(self.extent_px[0]),
+                down_px=float(self.extent_px[1]),
+                noise_px=float(self.sigma[0]),
             )
+        ]
+
+    def checked(self, places: Places, swing: Swing) -> tuple[Places, Swing]:
+        """The places and their motion as they are; or, where the bob swings more evenly without it, as they were before the
+        shake was taken away: then it was none, but a light that changed or an object that moved."""
+        some = places.some()
+        x, y = places.x_px + self.x, places.y_px + self.y
+        still = fit_swing(
+            places.t_s[some], x[some], y[some], np.full(some.size, 0.1), swing.values_at(places.t_s[some[0]])
         )
+        if still is None or still.rms_px > _EVENER * swing.rms_px:
+            return places, swing
+        self.x, self.y, self.sigma = np.zeros_like(x), np.zeros_like(y), np.zeros_like(x)
+        self.taken = False
+        return replace(places, x_px=x, y_px=y), still
 
 
 def _smoothed(values: np.ndarray) -> tuple[np.ndarray, float]:

@@ -17,6 +17,7 @@ _STRAYS_PX = 0.1  # less does not stray, whatever its error bar
 _STRAYS = 0.04  # of the bob's radius: more does
 _ENDLESS = 20  # so many times longer than the clip, half a period is no swing
 _STRAIGHT = 20  # diagonals of the picture: a pivot farther off is none
+_STRETCH = 3.0  # periods
 _UNEVEN_PX = 0.15  # by so much the places of an uneven bob may stray, unmentioned
 
 
@@ -33,18 +34,46 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
         reasons.append("nothing pulls it back")
     if span <= half / _ENDLESS or not 0 < amplitude < np.pi:
         reasons.append("it does not turn back")
-    if swing.length_px > _STRAIGHT * np.hypot(*size_px):
-        reasons.append("it moves along a straight line")
+    least = 1 / (_STRAIGHT * np.hypot(*size_px))  # bend of the path, 1/px: less is none, if it is known so well
+    straight = swing.length_px > 1 / least and 3 * np.sqrt(swing.covariance[2, 2]) / swing.length_px**2 < least
     shaky = 0.06 if good.mean() > 0.95 else 0.04  # a hand-held camera before a plain wall: told as a warning
-    if swing.rms_px > max(shaky * extent, 0.3):
+    strays = swing.rms_px > max(shaky * extent, 0.3)
+    seldom = good.mean() < 0.6 and swing.rms_px > 0.015 * extent
+    if (straight or strays or seldom) and swing.values[4] > 0 and _is_ellipse(swing, places):
+        straight = strays = seldom = False
+    if straight:
+        reasons.append("it moves along a straight line")
+    if strays:
         reasons.append(f"it strays {swing.rms_px:.1f} px from a swing of {extent:.0f} px")
-    if good.mean() < 0.6 and swing.rms_px > 0.015 * extent:
+    if seldom:
         reasons.append(f"it was seen on {good.mean():.0%} of the frames, straying {swing.rms_px:.1f} px")
     growth, growth_sigma = _growth(swing, t[good])
     if growth - 3 * growth_sigma > 0.5:
         reasons.append(f"its swing grows by {np.expm1(growth):.0%}")
     if reasons:
         raise JobError(f"what moves in {path} is no pendulum ({reasons[0]}); if there is one, {REMEDY}")
+
+
+def _is_ellipse(swing: Swing, places: Places) -> bool:
+    """Does it swing in an ellipse, which before a tilted camera is no arc? Told as a warning. Then a slowly changing ellipse
+    with a little of its first overtone goes through the places of any few swings far more closely than the arc does."""
+    t, points = places.t_s[places.good], np.column_stack([places.x_px, places.y_px])[places.good]
+    rate, square, count = 2 * np.pi / swing.period_s, 0.0, 0
+    for begin in np.arange(t[0], t[-1], _STRETCH * swing.period_s):
+        part = (t >= begin) & (t < begin + _STRETCH * swing.period_s)
+        late = t[part] - begin
+        if part.sum() < 20 or np.ptp(late) < 1.5 * swing.period_s:
+            continue
+        least = np.inf
+        for factor in np.linspace(0.88, 1.12, 25):
+            phase = factor * rate * late
+            c, s = np.cos(phase), np.sin(phase)
+            waves = np.stack([np.ones_like(c), c, s, late * c, late * s, np.cos(2 * phase), np.sin(2 * phase)], axis=1)
+            rest = points[part] - waves @ np.linalg.lstsq(waves, points[part], rcond=None)[0]
+            least = min(least, float(np.sum(rest**2)))
+        square, count = square + least, count + 2 * (int(part.sum()) - 7)
+    rms_px = np.sqrt(square / count) if count else np.inf
+    return bool(rms_px < min(0.25 * swing.rms_px, max(0.015 * places.extent_px, 0.3)))
 
 
 def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:
