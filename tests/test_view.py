@@ -167,6 +167,22 @@ def test_a_tilt_from_near_or_from_afar_is_left_open():
     assert np.sqrt(view.weights @ (nearness - middle) ** 2) > 0.2  # the prior's is 0.5
 
 
+def test_a_wide_ellipse_before_a_tilted_camera_is_found_for_what_it_is():
+    """Its path is no arc at all: from a swing in one plane, no tilt leads there. How the plane of the swing is turned is told
+    by perspective only, and the angles are as uncertain as that."""
+    view, truth, places = seen(
+        0.123,
+        out_of_plane={"amplitude_rad": 0.102, "phase_rad": 0.42, "distance_m": 1.4},
+        perspective={"yaw_rad": -0.068, "pitch_rad": 0.096, "roll_rad": -0.06, "distance_m": 2.2},
+    )
+    off, u, rest = errors(view, truth, places)
+    assert {"tilt", "sway"} <= set(view.shown)
+    assert abs(off) < 4 * u
+    assert rest < 3 * np.sqrt(np.mean(view.uncertainty(*places)[3] ** 2))
+    assert np.std(view.position(*places)[1] - places[2]) < 1.2 * SIGMA
+    assert np.hypot(*(np.array(view.pivot_px) - truth.pivot_px[0])) < 1.0
+
+
 def test_a_swing_of_which_one_side_is_hidden_keeps_its_vertical():
     view, truth, (t, x, y) = seen(string=False)
     side = truth.theta_rad > 0.1

@@ -13,7 +13,8 @@ from toolkit.tracking.swing import Swing
 from toolkit.tracking.view import View
 from toolkit.tracking.view_fit import Lines, fit_view
 
-_SETTLED = 0.6  # a second view is fitted only where the first made σ smaller than this share of what it was fitted with
+_VIEWS = 4  # at most
+_SETTLED = 0.6  # another view is fitted only where the last made σ smaller than this share of what it was fitted with
 
 
 class Camera(NamedTuple):
@@ -62,7 +63,7 @@ def fit_jointly(
     when = t / camera.fps_factor
     mx, my = swing.position(t)
     joint = Joint(None, factors(mx, my, rough=True), mx, my)
-    for _ in range(2):
+    for _ in range(_VIEWS):
         scale = joint.factors
         found = fit_view(
             when[good],

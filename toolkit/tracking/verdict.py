@@ -34,8 +34,7 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
         reasons.append("nothing pulls it back")
     if span <= half / _ENDLESS or not 0 < amplitude < np.pi:
         reasons.append("it does not turn back")
-    least = 1 / (_STRAIGHT * np.hypot(*size_px))  # bend of the path, 1/px: less is none, if it is known so well
-    straight = swing.length_px > 1 / least and 3 * np.sqrt(swing.covariance[2, 2]) / swing.length_px**2 < least
+    straight = swing.length_px > _STRAIGHT * np.hypot(*size_px)
     shaky = 0.06 if good.mean() > 0.95 else 0.04  # a hand-held camera before a plain wall: told as a warning
     strays = swing.rms_px > max(shaky * extent, 0.3)
     seldom = good.mean() < 0.6 and swing.rms_px > 0.015 * extent
@@ -58,7 +57,7 @@ def _is_ellipse(swing: Swing, places: Places) -> bool:
     """Does it swing in an ellipse, which before a tilted camera is no arc? Told as a warning. Then a slowly changing ellipse
     with a little of its first overtone goes through the places of any few swings far more closely than the arc does."""
     t, points = places.t_s[places.good], np.column_stack([places.x_px, places.y_px])[places.good]
-    rate, square, count = 2 * np.pi / swing.period_s, 0.0, 0
+    rate, square, count, seen = 2 * np.pi / swing.period_s, 0.0, 0, 0
     for begin in np.arange(t[0], t[-1], _STRETCH * swing.period_s):
         part = (t >= begin) & (t < begin + _STRETCH * swing.period_s)
         late = t[part] - begin
@@ -71,9 +70,10 @@ def _is_ellipse(swing: Swing, places: Places) -> bool:
             waves = np.stack([np.ones_like(c), c, s, late * c, late * s, np.cos(2 * phase), np.sin(2 * phase)], axis=1)
             rest = points[part] - waves @ np.linalg.lstsq(waves, points[part], rcond=None)[0]
             least = min(least, float(np.sum(rest**2)))
-        square, count = square + least, count + 2 * (int(part.sum()) - 7)
+        square, count, seen = square + least, count + 2 * (int(part.sum()) - 7), seen + 1
     rms_px = np.sqrt(square / count) if count else np.inf
-    return bool(rms_px < min(0.25 * swing.rms_px, max(0.015 * places.extent_px, 0.3)))
+    told = 0.5 * count + 7 * seen > 0.9 * t.size
+    return bool(told and rms_px < min(0.25 * swing.rms_px, max(0.005 * places.extent_px, 0.3)))
 
 
 def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:

@@ -31,6 +31,8 @@ _PRIOR = {
     "sway_sin": (0.0, 0.05), "sway_cos": (0.0, 0.05), "readout": (0.0, 0.015),
 }  # fmt: skip
 _TILTS = ((0.1, 0.05), (-0.1, 0.05), (0.1, -0.05), (-0.1, -0.05))
+_SWAYS = ((0.06, 0.0), (-0.06, 0.0), (0.0, 0.06), (0.0, -0.06))
+_POOR = 2.0  # times what σ and bent errors alone leave: then the view may be one of a wide ellipse
 _SQUARE = (*SWING_NAMES, "factor")
 _BENDING = tuple(AT[name] for name in NAMES[10:])  # what bends the model: sampled; the rest follows linearly
 _MOST = 160  # positions, and half as many lines, are enough to see what the camera did
@@ -102,6 +104,9 @@ def fit_view(
     problem.trim(square.values)
     chosen = problem.solve(square.values, _SQUARE, 8) or square
     sides = problem.modes(chosen.values, *_turned(chosen.values), deep=np.inf)
+    wide = bool(sides) and problem.inflation(sides[0].values) > _POOR * problem.least_inflation
+    if wide:
+        sides = problem.modes(sides[0].values, *_swayed(_turned(chosen.values)[1]), deep=np.inf)
     modes = sides[:1]
     shown: tuple[str, ...] = ()
     while modes and len(shown) < len(GROUPS):
@@ -114,7 +119,10 @@ def fit_view(
         for group in GROUPS:
             if group in shown:
                 continue
-            for trial in _turned(chosen.values) if group == "tilt" else [chosen.values]:
+            trials = [chosen.values] if group != "tilt" else _turned(chosen.values)
+            if wide:
+                trials += [modes[0].values]
+            for trial in trials:
                 found = problem.solve(trial, _names((*shown, group)), 8)
                 if found is not None and found.chi2 < best.chi2:
                     best, winner = found, group
@@ -151,6 +159,15 @@ def _turned(values: np.ndarray) -> list[np.ndarray]:
         turned.append(values.copy())
         turned[-1][[AT["yaw"], AT["pitch"]]] = tilt
     return turned
+
+
+def _swayed(values: np.ndarray) -> list[np.ndarray]:
+    """The same in a plane that is turned one way or the other, or in an ellipse that is run through either way round."""
+    swayed = []
+    for sway in _SWAYS:
+        swayed.append(values.copy())
+        swayed[-1][[AT["sway_sin"], AT["sway_cos"]]] = sway
+    return swayed
 
 
 def _spread(least: Minimum, names: tuple[str, ...]) -> np.ndarray:
@@ -296,6 +313,11 @@ class _Problem:
                 slopes = ((self.line_rest(moved) - rest) * self.line_weight / 0.01).T
                 own[:2] -= np.linalg.lstsq(slopes, rest * self.line_weight, rcond=1e-6)[0]
 
+    @property
+    def least_inflation(self) -> float:
+        """The inflation of residuals that are as large as their σ."""
+        return float(np.sqrt(1.0 + 0.25 * self.t.size / 5))
+
     def inflation(self, values: np.ndarray) -> float:
         """How far the residuals exceed their σ, with their correlation from frame to frame.
 
@@ -306,7 +328,7 @@ class _Problem:
         left = self.rest(values) * self.weaker
         block = max(2, min(20, n // 12))
         whole = n // block * block
-        found = 1.0 + 0.25 * n / 5
+        found = self.least_inflation**2
         for r in (left[:n], left[n : 2 * n]):
             sums = r[:whole].reshape(-1, block).sum(axis=1)
             found = max(found, float(np.mean(r**2)), float(np.mean(sums**2)) / block)
