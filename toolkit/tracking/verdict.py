@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +59,9 @@ def _is_ellipse(swing: Swing, places: Places) -> bool:
     with a little of its first overtone goes through the places of any few swings far more closely than the arc does."""
     t, points = places.t_s[places.good], np.column_stack([places.x_px, places.y_px])[places.good]
     rate, square, count, seen = 2 * np.pi / swing.period_s, 0.0, 0, 0
-    for begin in np.arange(t[0], t[-1], _STRETCH * swing.period_s):
-        part = (t >= begin) & (t < begin + _STRETCH * swing.period_s)
+    edges = np.linspace(t[0], t[-1], 1 + max(1, round((t[-1] - t[0]) / (_STRETCH * swing.period_s))))
+    for begin, end in pairwise(edges):
+        part = (t >= begin) & ((t < end) | (end == t[-1]))
         late = t[part] - begin
         if part.sum() < 20 or np.ptp(late) < 1.5 * swing.period_s:
             continue
