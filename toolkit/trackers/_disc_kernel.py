@@ -98,6 +98,7 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
             bright[count] = image[image_row + column]
             wall[count] = back[back_row + column]
             n = seen[seen_row + column]
+            keep &= n >= 0.0
             known[count] = n if n > 0.0 else 1.0 / 3.0
             count += keep
             column += 1

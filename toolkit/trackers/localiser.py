@@ -13,7 +13,8 @@ class Patch(NamedTuple):
     """The piece of a frame around the bob, all arrays (h, w) float32.
 
     image : the frame (luma, or the colour projection in which the bob stands out).    back : what the picture is
-    without the bob.    seen : in how many frames each pixel of `back` was seen; 0 where it is only a guess.
+    without the bob.    seen : in how many frames each pixel of `back` was seen; 0 where it is only a guess, negative where
+    something stands before the bob's way: such pixels tell nothing.
     x_px, y_px : where the patch's first pixel lies (where the camera shakes: in the first frame's pixels).
     """
 

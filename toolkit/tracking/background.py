@@ -8,9 +8,12 @@ import numpy as np
 
 from toolkit.motion.compiled import address, call, kernel
 
+_BEFORE = -1e9  # plus one it stays what it is, and what is mixed with it is negative
+
 
 class Background:
-    """Mean picture `mean` (h, w) float32 and in how many frames each pixel was seen, `seen` (h, w) float32."""
+    """Mean picture `mean` (h, w) float32 and in how many frames each pixel was seen, `seen` (h, w) float32: negative where what
+    is seen stands before the bob's way."""
 
     def __init__(self, shape: tuple[int, int], fill: float = 0.0) -> None:
         self.mean = np.full(shape, fill, np.float32)
@@ -42,6 +45,10 @@ class Background:
             add, plane.ctypes.data, address(self.mean) + skipped, address(self.seen) + skipped, address(numbers),
             y1 - y0, x1 - x0, plane.shape[1], self.mean.shape[1],
         )  # fmt: skip
+
+    def stand_before(self, front: np.ndarray) -> None:
+        """What is seen at these pixels, (h, w) bool, hides the bob."""
+        self.seen[front] = _BEFORE
 
     def window(self, x0: int, y0: int, width: int, height: int, dx: float, dy: float) -> tuple[np.ndarray, np.ndarray]:
         """Mean and seen of the pixels from (x0, y0) on, moved by a fraction of a pixel; beyond the rim the rim's."""

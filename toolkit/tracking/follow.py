@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
+from toolkit.tracking.front import ROUND, WITHIN, enough_shows, hidden_share
 from toolkit.tracking.learn import Known
 from toolkit.tracking.looks import light_on
 from toolkit.tracking.repeat import alike, thinned
@@ -22,9 +23,6 @@ from toolkit.video import Frame
 
 _STRING_EVERY = 3
 _SEARCH_EVERY = 4  # hidden frames
-_TURN = np.arange(100) * np.pi * (3 - np.sqrt(5))  # a sunflower's places: even over the unit disc
-_ROUND = np.stack([np.cos(np.arange(32) * np.pi / 16), np.sin(np.arange(32) * np.pi / 16)])
-_WITHIN = np.sqrt((np.arange(100) + 0.5) / 100) * np.stack([np.cos(_TURN), np.sin(_TURN)])
 
 
 @dataclass
@@ -161,16 +159,25 @@ class Follower(Known):
             found = None if wide is None else self._outline_in(wide)
         if wide is None or found is None:
             return None
-        near = guess._replace(x_px=found[0], y_px=found[1])
-        close = self._patch(frame, look, near)
-        if close is None:
-            return None
-        other = self._locate(close, near)
-        px, py = self.swing.pivot_px
-        off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - self.swing.length_px)
-        alike = other.visible >= min(0.9, self._least_visible() + 0.05) and 0.6 < other.contrast / look.contrast < 1.6
-        on_arc = off_arc < 0.5 * look.radius_px + 2 + 2 * self.swing.rms_px
-        return (other, close) if alike and on_arc and self._believe(close, other, near) else None
+        x, y, _ = found
+        places = [(x, y)]
+        if self.shadow is not None:  # it may be the shadow's
+            places.append((x - self.shadow.right_px, y - self.shadow.down_px))
+        for x, y in places:
+            near = guess._replace(x_px=x, y_px=y)
+            close = self._patch(frame, look, near)
+            if close is None:
+                continue
+            other = self._locate(close, near)
+            px, py = self.swing.pivot_px
+            off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - self.swing.length_px)
+            alike = (
+                other.visible >= min(0.9, self._least_visible() + 0.05) and 0.6 < other.contrast / look.contrast < 1.6
+            )
+            on_arc = off_arc < 0.5 * look.radius_px + 2 + 2 * self.swing.rms_px
+            if alike and on_arc and self._believe(close, other, near):
+                return other, close
+        return None
 
     def _outline_in(self, wide: Patch, least: float = 0.6) -> tuple[float, float, float] | None:
         """The centre of the best outline of the bob's size before the background, and how much of the circle was seen; None
@@ -197,7 +204,7 @@ class Follower(Known):
         """How bright the light on the bob is against that when the background was learned: by the wall beside it."""
         if not isfinite(place.wall):
             return 1.0
-        around = _back_at(patch, place, self.look.radius_px + 2 * self.look.edge_px, _ROUND)
+        around = _back_at(patch, place, self.look.radius_px + 2 * self.look.edge_px, ROUND)
         level = float(around.mean()) if around.size else 0.0
         return min(max(place.wall / level, 0.3), 3.0) if level > 1 else 1.0
 
@@ -242,7 +249,15 @@ class Follower(Known):
             and place.visible >= self._least_visible()
             and misfit < 2 * self.ordinary_misfit + 0.03 * abs(look.contrast)
             and hypot(place.x_px - guess.x_px, place.y_px - guess.y_px) < 0.6 * look.radius_px + 2
+            and self._shows(place)
         )
+
+    def _shows(self, place: Place) -> bool:
+        """Does enough of the bob show beside what stands before it? The disc fit leaves the rest out, other localisers do not."""
+        if self.front is None:
+            return True
+        seen_so = self.front, place.x_px, place.y_px, self.look.radius_px
+        return enough_shows(*seen_so) if self.localiser.name == "disc" else hidden_share(*seen_so) < 0.1
 
     def _stands_out(self, patch: Patch, place: Place) -> bool:
         """Does the bob differ from what is known to stand still where it is? Half behind a post of about its own brightness it
@@ -254,7 +269,9 @@ class Follower(Known):
         if isnan(shade) or not isfinite(place.wall):
             return True
         still = patch._replace(back=self.back.mean, x_px=0.0, y_px=0.0)  # without the bob's own shadow
-        behind = _back_at(still, place, self.look.radius_px, _WITHIN)
+        behind = _back_at(still, place, self.look.radius_px, WITHIN)
+        if self.front is not None:
+            behind = behind[~_back_at(still._replace(back=self.front), place, self.look.radius_px, WITHIN)]
         if behind.size < 8:
             return True
         unlike = np.count_nonzero(np.abs(behind - shade) > 0.45 * abs(self.look.contrast))
@@ -263,8 +280,8 @@ class Follower(Known):
     def _unlike(self, patch: Patch, place: Place) -> float:
         """How much of a bob with a pattern differs from what stands still where it is."""
         radius = self.look.radius_px
-        behind = _back_at(patch, place, radius, _WITHIN)
-        shown = _back_at(patch._replace(back=patch.image), place, radius, _WITHIN)
+        behind = _back_at(patch, place, radius, WITHIN)
+        shown = _back_at(patch._replace(back=patch.image), place, radius, WITHIN)
         return float(np.mean(np.abs(shown - behind) > 0.2 * abs(self.look.contrast) + 4)) if behind.size else nan
 
     def _remember(self, t_s: float, place: Place) -> None:

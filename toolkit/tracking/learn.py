@@ -11,16 +11,19 @@ from toolkit.trackers import load_tracker, tracker_names
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.tracking.acquire import is_even, scattered
 from toolkit.tracking.background import Background
+from toolkit.tracking.front import EVEN, Rhythm, find_front, fit_each, is_clear, typical
 from toolkit.tracking.looks import Looks, Sightings, learn_looks
 from toolkit.tracking.search import still_picture
 from toolkit.tracking.shadow import Shaded, Shadow, find_shadow
 from toolkit.tracking.sight import LUMA
 from toolkit.tracking.stillness import STILL, Anchors, CameraShift
-from toolkit.tracking.swing import Swing, fit_swing
+from toolkit.tracking.swing import CALM, Swing, fit_swing
 from toolkit.tracking.trail import Rough, cut
 from toolkit.video import Frame
 
 _CHECK_EVERY = 12
+_SAMPLES = 20  # frames on which it is looked whether anything hides the bob
+_ENOUGH = 12  # frames
 
 
 class Trial(NamedTuple):
@@ -59,15 +62,15 @@ class Known:
         self.interval_s = float(np.median(np.diff([f.t_s for f in batch]))) or 1 / 30
         points = self._learn_stillness(batch, rough)
         self.shadow: Shadow | None = None
+        self.front: np.ndarray | None = None
         self._learn_background(batch, rough.look, points)
-        looks = self._learn_looks(batch, rough.look, points, radius)
-        shaded = self._learn_shadow(batch, looks.look, points)
-        if shaded is not None:
-            self.shadow = shaded.shadow
-            points = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
-            bare = looks.look._replace(radius_px=radius or shaded.radius_px, edge_px=shaded.edge_px)
-            self._learn_background(batch, bare, points)
-            looks = self._learn_looks(batch, bare, points, radius)
+        before = self.swing, points
+        looks, points = self._learn_bob(batch, *self._learn_front(batch, rough.look, points), radius)
+        if self.front is not None and not (looks.look.even and looks.look.noise < EVEN * abs(looks.look.contrast)):
+            self.front = self.shadow = None  # what looked like the wall is a part of the bob's pattern
+            self.swing, points = before
+            self._learn_background(batch, rough.look, points)
+            looks, points = self._learn_bob(batch, rough.look, points, radius)
         self.look, self.exposure_s, self.growth = looks
         self.found = {batch[i].index: p for i, p in points.items()}
         self.ordinary_misfit = self.look.noise
@@ -145,10 +148,67 @@ class Known:
         still = still_picture([f.luma if plain else self.sight.window(f, 0, 0, *self.shape[::-1]) for f in few])
         np.copyto(self.back.mean, still, where=beyond)
         self.back.seen[beyond] = 1.0
+        if self.front is not None:
+            self.back.stand_before(self.front)
+
+    def _learn_front(
+        self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]]
+    ) -> tuple[Look, dict[int, tuple[float, float]]]:
+        """Does something stand before the bob's way? Then its looks and points are those where enough of it shows; `front` says
+        where that something is. Else they are as before."""
+        before = look, points
+        t_s = np.array([frame.t_s for frame in batch])
+        places = points
+
+        def show(i: int, x: float, y: float) -> tuple[Guess, Patch | None]:
+            guess = self._guess(x, y, 0.0, 0.0)
+            return guess, self._patch(batch[i], look, guess)
+
+        some = dict(list(points.items())[:: max(1, len(points) // _SAMPLES)])
+        clear = [fit for fit in fit_each(show, some, look).values() if is_clear(fit)]
+        if len(clear) == len(some) and len(points) > 0.97 * len(batch):
+            return before
+        for _ in range(2):  # what stands before it spoils the points by which it is found
+            fits = fit_each(show, places, look)
+            rhythm = Rhythm.through(t_s, fits, self.swing.period_s) if len(fits) >= _ENOUGH else None
+            if rhythm is None or rhythm.strays_px > 0.1 * look.radius_px:
+                self.front = None
+                break
+            fits = {i: fit for (i, fit), true in zip(fits.items(), rhythm.true) if true}
+            points = {i: (float(fit[0]), float(fit[1])) for i, fit in fits.items()}
+            places = dict(enumerate(map(tuple, rhythm.position(t_s).tolist()))) | points
+            look, shade = typical(look, list(fits.values()))
+            self.front = None
+            self._learn_background(batch, look, places)
+            self.front = find_front(show, places, self.back, look, shade)
+            if self.front is None:
+                break
+            self.back.stand_before(self.front)
+        if self.front is not None:
+            t, (x, y) = t_s[list(points)], np.array(list(points.values())).T
+            self.swing = fit_swing(t, x, y, np.full(t.size, 0.3), self.swing.values_at(t[0]), prior=CALM) or self.swing
+            return look, points
+        self.front = None
+        self._learn_background(batch, *before)
+        return before
 
     def _dark(self, x: float, y: float, reach: float) -> tuple[float, float, float]:
         """The circle (x, y, radius) in which the bob, or its shadow, changes the background."""
         return (x, y, reach) if self.shadow is None else self.shadow.circle(x, y, reach)
+
+    def _learn_bob(
+        self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]], radius: float | None
+    ) -> tuple[Looks, dict[int, tuple[float, float]]]:
+        """The looks, and its shadow; the points without what the shadow drew them by."""
+        looks = self._learn_looks(batch, look, points, radius)
+        shaded = self._learn_shadow(batch, looks.look, points)
+        if shaded is not None:
+            self.shadow = shaded.shadow
+            points = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
+            bare = looks.look._replace(radius_px=radius or shaded.radius_px, edge_px=shaded.edge_px)
+            self._learn_background(batch, bare, points)
+            looks = self._learn_looks(batch, bare, points, radius)
+        return looks, points
 
     def _learn_shadow(self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]]) -> Shaded | None:
         """The shadow beside a bob of this look, from the frames on which it is slow."""

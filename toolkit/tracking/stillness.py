@@ -91,8 +91,9 @@ class Anchors:
         off = np.hypot(*(moved[:, :2] - middle).T)
         limit = max(1.0, 3 * float(np.median(off[good])))
         good &= off < limit
-        if good.sum() < 2:
-            return None  # one window alone may sit on something that moves
+        first, *others = moved[good, :2]
+        if not others or (len(others) == 1 and np.hypot(*(others[0] - first)) > 1.0):
+            return None  # one window alone, or one of two that disagree, may sit on something that moves
         weight = np.where(good, 1 / sigma**2, 0.0)
         dx, dy = self.points[:, 0] - self.centre[0], self.points[:, 1] - self.centre[1]
         spread = float(np.sqrt(np.average(dx * dx + dy * dy, weights=weight)))
