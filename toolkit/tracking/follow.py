@@ -61,10 +61,8 @@ class Follower(Known):
         self.first: list[Frame] = []  # the frames read ahead, if they are the first that will be followed
         self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
         self._picture: Frame | None = None  # the one that is measured
-        self._unlike_seen = (
-            np.nan
-        )  # how much of a bob with a pattern differs from what stands still, at the place judged last
-        self._usually_unlike = np.nan  # and lately
+        # how much of a bob with a pattern differs from what stands still: at the place judged last, and lately
+        self._unlike_seen = self._usually_unlike = np.nan
         self._speed = 0.0  # of the bob on it, px/s
         self._lit: tuple[float, Frame | None] = (nan, None)  # the bob's brightness lately, and on which picture
 
