@@ -20,8 +20,8 @@ def covered(x, y, radius, edge, shape):
     return ndtr((radius - np.hypot(columns - x, rows - y)) / edge)
 
 
-def picture(x, y, wall, shadow, rng):
-    bob = covered(x, y, 12.0, 0.7, wall.shape)
+def picture(x, y, wall, shadow, rng, edge=0.7):
+    bob = covered(x, y, 12.0, edge, wall.shape)
     if shadow is not None:
         right, down, radius, soft, strength = shadow
         wall = wall * (1 - strength * covered(x + right, y + down, radius, soft, wall.shape))
@@ -63,13 +63,21 @@ def test_the_circle_holds_bob_and_shadow():
     assert Shadow(1.0, 0.0, 10.0, 0.5, 0.4).circle(0.0, 0.0, 13.0) == (0.0, 0.0, 13.0)
 
 
-def test_a_bob_with_a_shadow_that_it_overlaps_is_tracked_to_a_tenth_of_a_pixel(tmp_path):
+@pytest.mark.parametrize(
+    ("shadow", "edge"),
+    [
+        ((-7.0, 8.0, 12.0, 4.0, 0.45), 0.7),
+        ((-15.0, 5.0, 12.0, 2.5, 0.45), 0.7),  # bob and shadow look like one long thing
+        ((-12.0, -14.0, 12.0, 5.0, 0.4), 0.7),
+        ((-7.0, 5.0, 12.0, 2.0, 0.17), 2.5),  # weak, in a picture that is not sharp
+    ],
+)
+def test_a_bob_with_a_shadow_that_it_overlaps_is_tracked_to_a_tenth_of_a_pixel(tmp_path, shadow, edge):
     rng = np.random.default_rng(1)
     theta = angles(np.arange(120) / 60)
     x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
     wall = np.full((H, W), 185.0)
-    shadow = (-7.0, 8.0, 12.0, 4.0, 0.45)
-    frames = [np.clip(picture(a, b, wall, shadow, rng), 0, 255).astype(np.uint8) for a, b in zip(x, y)]
+    frames = [np.clip(picture(a, b, wall, shadow, rng, edge), 0, 255).astype(np.uint8) for a, b in zip(x, y)]
     found = track(film(tmp_path / "shadow.mp4", frames))
     assert (found.status == OK).mean() > 0.97
     assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5

@@ -24,6 +24,9 @@ from toolkit.video import Frame
 _CHECK_EVERY = 12
 _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
+_CALMER = (
+    0.7  # times what is not explained of a bob with a pattern: so much less with a shadow beside it, or there is none
+)
 
 
 class Trial(NamedTuple):
@@ -200,19 +203,24 @@ class Known:
         self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]], radius: float | None
     ) -> tuple[Looks, dict[int, tuple[float, float]]]:
         """The looks, and its shadow; the points without what the shadow drew them by."""
-        looks = self._learn_looks(batch, look, points, radius)
-        shaded = self._learn_shadow(batch, looks.look, points)
-        if shaded is not None:
-            self.shadow = shaded.shadow
-            points = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
-            bare = looks.look._replace(radius_px=radius or shaded.radius_px, edge_px=shaded.edge_px)
-            self._learn_background(batch, bare, points)
-            looks = self._learn_looks(batch, bare, points, radius)
-        return looks, points
+        alone = self._learn_looks(batch, look, points, radius)
+        shaded = self._learn_shadow(batch, alone.look, points)
+        if shaded is None:
+            return alone, points
+        self.shadow = shaded.shadow
+        without = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
+        bare = alone.look._replace(radius_px=radius or shaded.radius_px, edge_px=shaded.edge_px, even=True)
+        self._learn_background(batch, bare, without)
+        looks = self._learn_looks(batch, bare, without, radius)
+        if alone.look.even or looks.look.even or _unlike(looks.look) < _CALMER * _unlike(alone.look):
+            return looks, without
+        self.shadow = None  # a bob with a pattern, but no shadow
+        self._learn_background(batch, look, points)
+        return alone, points
 
     def _learn_shadow(self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]]) -> Shaded | None:
-        """The shadow beside a bob of this look, from the frames on which it is slow."""
-        if not look.even or self.sight.weights != LUMA:
+        """The shadow beside a bob of about this look, from the frames on which it is slow."""
+        if self.sight.weights != LUMA:
             return None
         numbers = np.array(list(points))
         speed = np.hypot(*self.swing.velocity(np.array([batch[i].t_s for i in numbers])))
@@ -361,6 +369,11 @@ class Known:
             back, seen = self.back.window(x0, y0, columns, rows, dx - round(dx), dy - round(dy))
             patch = Patch(patch.image, back, seen, patch.x_px - dx, patch.y_px - dy)
         return patch if self.shadow is None else self.shadow.cast(patch, guess)
+
+
+def _unlike(look: Look) -> float:
+    """The share of its contrast that a bob of this look leaves unexplained."""
+    return look.noise / max(abs(look.contrast), 1.0)
 
 
 def _by_speed(speed: np.ndarray, visible: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:

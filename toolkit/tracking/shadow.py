@@ -65,7 +65,7 @@ def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
     """The shadow beside an even bob, by a disc and a soft darker disc behind it that are fitted to patches on which the bob is
     slow (each with the guess at its centre). None where the bob alone explains them nearly as well."""
     u, v, image, back, beside = _pixels(seen, look)
-    unlike = look.noise > 0.05 * abs(look.contrast) + 2.5  # a shadow that overlaps the bob is fitted as a part of it
+    unlike = look.noise > 0.02 * abs(look.contrast) + 2.5  # a shadow that overlaps the bob is fitted as a part of it
     if u.size < 200 or not (unlike or _light_is_missed(u, v, image, back, beside, look)):
         return None
     contrast = look.contrast or float(np.median(image) - np.median(back))
@@ -93,6 +93,8 @@ def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
             starts.append(fit(start, range(13), 4, 4))
     starts.sort(key=lambda s: s[1])
     values, with_it = min((fit(start, range(13), 1, 15) for start, _ in starts[:2]), key=lambda s: s[1])
+    if values[12] < values[3]:  # the bob has the sharper edge in most pictures: they may have been taken for each other
+        values, with_it = min((values, with_it), fit(_exchanged(values), range(13), 1, 15), key=lambda s: s[1])
     cx, cy, radius, edge = (float(a) for a in values[:4])
     shadow = Shadow(*(float(values[k]) for k in (8, 9, 11, 12, 10)))
     far = float(np.hypot(shadow.right_px, shadow.down_px))
@@ -103,7 +105,7 @@ def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
         and shadow.soft_px > 0.3
         and radius + 1 < far + shadow.radius_px < 6 * radius
     )
-    if not plausible or with_it > 0.7 * without:
+    if not plausible or with_it > 0.75 * without:
         return None
     return Shaded(shadow, cx, cy, radius, max(0.35, edge))
 
@@ -137,7 +139,7 @@ def _light_is_missed(
 ) -> bool:
     """Is it darker beside the bob, on one side of it, than where the bob is not?"""
     near = np.hypot(u, v) / look.radius_px
-    ring = beside & (near > 1.1 + 2 * look.edge_px / look.radius_px) & (near < 2.2)
+    ring = beside & (near > 1.1 + look.edge_px / look.radius_px) & (near < 2.2)
     side = (np.arctan2(v, u) * 4 / np.pi).astype(int) % 8
     light = [
         np.median((image / np.maximum(back, 1.0))[ring & (side == k)])
@@ -153,6 +155,12 @@ def _model(values: np.ndarray, u: np.ndarray, v: np.ndarray, back: np.ndarray) -
     bob = _covered(np.hypot(x, y), radius, edge)
     wall = gain * back * (1 - strength * _covered(np.hypot(x - right, y - down), size, soft))
     return wall * (1 - bob) + (shade + shade_x * x + shade_y * y) * bob
+
+
+def _exchanged(values: np.ndarray) -> np.ndarray:
+    """The model with the bob where its shadow was, and the other way round."""
+    cx, cy, radius, edge, shade, _, _, gain, right, down, strength, size, soft = values
+    return np.array([cx + right, cy + down, size, soft, shade, 0, 0, gain, -right, -down, strength, radius, edge])
 
 
 def _covered(distance: np.ndarray, radius: float, edge: float) -> np.ndarray:
