@@ -212,7 +212,7 @@ class Known:
         bare = alone.look._replace(radius_px=radius or shaded.radius_px, edge_px=shaded.edge_px, even=True)
         self._learn_background(batch, bare, without)
         looks = self._learn_looks(batch, bare, without, radius)
-        if alone.look.even or looks.look.even or _unlike(looks.look) < _CALMER * _unlike(alone.look):
+        if alone.look.even or looks.look.even:
             return looks, without
         self.shadow = None  # a bob with a pattern, but no shadow
         self._learn_background(batch, look, points)
@@ -369,11 +369,6 @@ class Known:
             back, seen = self.back.window(x0, y0, columns, rows, dx - round(dx), dy - round(dy))
             patch = Patch(patch.image, back, seen, patch.x_px - dx, patch.y_px - dy)
         return patch if self.shadow is None else self.shadow.cast(patch, guess)
-
-
-def _unlike(look: Look) -> float:
-    """The share of its contrast that a bob of this look leaves unexplained."""
-    return look.noise / max(abs(look.contrast), 1.0)
 
 
 def _by_speed(speed: np.ndarray, visible: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:

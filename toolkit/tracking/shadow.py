@@ -105,7 +105,7 @@ def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
         and shadow.soft_px > 0.3
         and radius + 1 < far + shadow.radius_px < 6 * radius
     )
-    if not plausible or with_it > 0.75 * without:
+    if not plausible or with_it > (0.75 if look.even else 0.5) * without:  # a pattern may look a little like a shadow
         return None
     return Shaded(shadow, cx, cy, radius, max(0.35, edge))
 
