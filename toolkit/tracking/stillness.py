@@ -92,7 +92,7 @@ class Anchors:
         limit = max(1.0, 3 * float(np.median(off[good])))
         good &= off < limit
         first, *others = moved[good, :2]
-        if not others or (len(others) == 1 and np.hypot(*(others[0] - first)) > 1.0):
+        if not others or (len(others) == 1 and np.hypot(*(others[0] - first)) > 3.0):
             return None  # one window alone, or one of two that disagree, may sit on something that moves
         weight = np.where(good, 1 / sigma**2, 0.0)
         dx, dy = self.points[:, 0] - self.centre[0], self.points[:, 1] - self.centre[1]
