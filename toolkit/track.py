@@ -242,12 +242,13 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     off_px = misfit * look.radius_px / 3
     strings = _strings(record, places, look.radius_px, fps_factor)
     camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor)
-    joint = fit_jointly(places, swing, shake, time_sigma, strings.seen(), camera)
+    lines = strings.seen()
+    joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
     missed = lone_strays(places, joint.x_px, joint.y_px)  # hidden while tilt, lens and shutter were not taken out
     if missed.any():
         places = places.without(missed)
         good = places.good
-        joint = fit_jointly(places, swing, shake, time_sigma, strings.seen(), camera)
+        joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
     log += strays_told(places, stray | missed)
 
     rx, ry = ((p - m)[good] for p, m in ((places.x_px, joint.x_px), (places.y_px, joint.y_px)))

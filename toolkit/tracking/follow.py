@@ -157,23 +157,21 @@ class Follower(Known):
             found = None if wide is None else self._outline_in(wide)
         if wide is None or found is None:
             return None
-        x, y, _ = found
-        places = [(x, y)]
+        places = [found[:2]]
         if self.shadow is not None:  # it may be the shadow's
-            places.append((x - self.shadow.right_px, y - self.shadow.down_px))
+            places.append((found[0] - self.shadow.right_px, found[1] - self.shadow.down_px))
+        px, py = self.swing.pivot_px
+        least = min(0.9, self._least_visible() + 0.05)
         for x, y in places:
             near = guess._replace(x_px=x, y_px=y)
             close = self._patch(frame, look, near)
             if close is None:
                 continue
             other = self._locate(close, near)
-            px, py = self.swing.pivot_px
             off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - self.swing.length_px)
-            alike = (
-                other.visible >= min(0.9, self._least_visible() + 0.05) and 0.6 < other.contrast / look.contrast < 1.6
-            )
+            like = other.visible >= least and 0.6 < other.contrast / look.contrast < 1.6
             on_arc = off_arc < 0.5 * look.radius_px + 2 + 2 * self.swing.rms_px
-            if alike and on_arc and self._believe(close, other, near):
+            if like and on_arc and self._believe(close, other, near):
                 return other, close
         return None
 

@@ -24,9 +24,6 @@ from toolkit.video import Frame
 _CHECK_EVERY = 12
 _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
-_CALMER = (
-    0.7  # times what is not explained of a bob with a pattern: so much less with a shadow beside it, or there is none
-)
 
 
 class Trial(NamedTuple):
@@ -191,7 +188,6 @@ class Known:
             t, (x, y) = t_s[list(points)], np.array(list(points.values())).T
             self.swing = fit_swing(t, x, y, np.full(t.size, 0.3), self.swing.values_at(t[0]), prior=CALM) or self.swing
             return look, points
-        self.front = None
         self._learn_background(batch, *before)
         return before
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.tracking.least_squares import least_squares
 from toolkit.tracking.places import Places
-from toolkit.tracking.swing import CALM, NAMES, Swing, fit_swing
+from toolkit.tracking.swing import CALM, NAMES, Swing, fit_swing, small_steps
 
 _ABOUT = 4  # steps on either side that tell how far the bob moves in one frame there
 _FAST = 0.4  # of the greatest speed: slower, a step two frames long may be one of a bob that gathers speed
@@ -89,9 +89,7 @@ def swing_of_sweeps(start: np.ndarray, places: Places, sweep: np.ndarray) -> tup
         return np.concatenate([(mx - x) / _FIT_PX, (my - y) / _FIT_PX, pulls, values[9:] / (3 * usual)])
 
     values = np.concatenate([start, np.zeros(part.max())])
-    steps = np.concatenate(
-        [[1e-3, 1e-3, 1e-3, 1e-6, 1e-6 * abs(start[4]), 1e-6, 1e-6, 1e-6, 1e-6], np.full(part.max(), 1e-5)]
-    )
+    steps = np.concatenate([small_steps(start), np.full(part.max(), 1e-5)])
     least = least_squares(rest, values, steps, range(values.size), turns=40)
     if least is None:
         return None

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from ctypes import addressof, c_double
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -114,9 +113,13 @@ def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
     return room[..., 9 + n :].reshape(*t.shape[:-1], 2, n)
 
 
-@cache
 def _kernel() -> Any:
     return kernel("swing", "toolkit.tracking._swing_kernel", "the swing")
+
+
+def small_steps(values: np.ndarray) -> np.ndarray:
+    """(9,) by how much each of the values (9,) is moved to see what the places do."""
+    return np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-6 * abs(values[4]), 1e-6, 1e-6, 1e-6, 1e-6])
 
 
 def fit_swing(
@@ -160,7 +163,7 @@ def fit_swing(
             / steps[index][:, None]
         ).T
 
-    steps = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-6 * abs(start[4]), 1e-6, 1e-6, 1e-6, 1e-6])
+    steps = small_steps(start)
     least = least_squares(rest, start, steps, index, turns=turns, slopes=slopes)
     if least is None:
         return None
