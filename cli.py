@@ -402,6 +402,7 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
     signal.signal(signal.SIGINT, _interrupt)
+    sys.unraisablehook = _unraisable
     try:
         code = app(prog_name="pendulab", standalone_mode=False)
     except (typer.Abort, KeyboardInterrupt):
@@ -432,6 +433,12 @@ def _interrupt(*_: object) -> None:
     """Ctrl-C: raised here and, where some library's code swallows that, again at the next step of the work."""
     _interrupted.set()
     raise KeyboardInterrupt
+
+
+def _unraisable(trouble: "sys.UnraisableHookArgs") -> None:
+    """A Ctrl-C that fell where nothing can be raised (in a finaliser) is not printed: the next step raises it."""
+    if not issubclass(trouble.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(trouble)
 
 
 def _unless_interrupted(show: "Progress") -> "Progress":

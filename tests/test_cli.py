@@ -344,6 +344,32 @@ def test_stopping_leaves_nothing_behind(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_stop_that_falls_into_a_finaliser_is_kept_and_not_printed(monkeypatch, capsys):
+    from threading import Event
+
+    import cli
+
+    class Dying:
+        def __init__(self, last: object):
+            self.last = last
+
+        def __del__(self):
+            self.last()
+
+    monkeypatch.setattr(sys, "unraisablehook", cli._unraisable)
+    monkeypatch.setattr(cli, "_interrupted", Event())
+    Dying(cli._interrupt)
+    assert capsys.readouterr().err == ""
+    with pytest.raises(KeyboardInterrupt):
+        cli._unless_interrupted(lambda stage, fraction: None)("track", 0.5)
+
+    def fails() -> None:
+        raise ValueError("something else")
+
+    Dying(fails)
+    assert "something else" in capsys.readouterr().err  # what is no Ctrl-C is told as ever
+
+
 def test_the_terminal_speaks_the_reports_language_and_tells_a_wrong_length(tmp_path):
     series = swing(tmp_path / "swing.csv")
     thai = pendulab("report", series, "--length-m", "0.3", "--lang", "th", "--format", "md", "--out", tmp_path / "th")
