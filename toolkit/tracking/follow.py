@@ -23,6 +23,7 @@ from toolkit.video import Frame
 
 _STRING_EVERY = 3
 _SEARCH_EVERY = 4  # hidden frames
+_UNSTEADY_PX = 0.3  # so far places stray from a swing before a camera that a hand holds
 
 
 @dataclass
@@ -65,6 +66,8 @@ class Follower(Known):
         self._unlike_seen = self._usually_unlike = np.nan
         self._speed = 0.0  # of the bob on it, px/s
         self._lit: tuple[float, Frame | None] = (nan, None)  # the bob's brightness lately, and on which picture
+        # no background shows how the camera moves, and the bob strays: then the string is measured on every frame
+        self.unsteady = len(self.anchors) < 2 and self.swing.rms_px > _UNSTEADY_PX
 
     def follow(self, frame: Frame) -> None:
         """Measure one frame, in the order of the file."""
@@ -88,7 +91,7 @@ class Follower(Known):
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
                 self._refit()
             self._update_background(patch, place, guess)
-            if len(r.index) % _STRING_EVERY == 1:
+            if self.unsteady or len(r.index) % _STRING_EVERY == 1:
                 self._measure_string(frame, place, shift)
         elif not repeated:
             self.hidden += 1
@@ -237,7 +240,7 @@ class Follower(Known):
         elif isnan(shade) or self.hidden > 15:
             bright = 0.5 < ratio / light < 2.0
         else:  # before something of another shade the contrast is another, but the bob is as bright as ever
-            clear = abs(ratio) > 0.3 or abs(place.contrast) > 8 * place.misfit
+            clear = abs(ratio) > 0.3 or abs(place.contrast) > 5 * place.misfit
             bright = clear and shade < 0.1 * abs(look.contrast) + 3 * self._shade_scatter
         misfit = place.misfit / max(light, 1.0)
         return bool(
@@ -256,27 +259,34 @@ class Follower(Known):
         return enough_shows(*seen_so) if self.localiser.name == "disc" else hidden_share(*seen_so) < 0.1
 
     def _stands_out(self, patch: Patch, place: Place) -> bool:
-        """Does the bob differ from what is known to stand still where it is? Half behind a post of about its own brightness it
-        seems whole: where nearly half of it could not be told from what is there without it, it is not believed."""
+        """Does the picture show the bob, and not what is known to stand still where it is? Half behind a post of about its own
+        brightness it seems whole. It is not believed where a third of it could not be told from what is there without it,
+        or where a quarter of what could be told is not the bob's."""
         if not self.look.even:
             self._unlike_seen = self._unlike(patch, place)
             return not self._unlike_seen < 0.65 * self._usually_unlike
-        shade = self._shade
+        shade, radius = self._shade, self.look.radius_px
         if isnan(shade) or not isfinite(place.wall):
             return True
         still = patch._replace(back=self.back.mean, x_px=0.0, y_px=0.0)  # without the bob's own shadow
-        behind = _back_at(still, place, self.look.radius_px, WITHIN)
+        light = (place.contrast + place.wall) / self._shade_seen
+        shown = _back_at(patch._replace(back=patch.image), place, radius, WITHIN) / max(light, 0.1)
+        behind = _back_at(still, place, radius, WITHIN)
+        if behind.size != shown.size:
+            return True  # at the picture's rim
         if self.front is not None:
-            behind = behind[~_back_at(still._replace(back=self.front), place, self.look.radius_px, WITHIN)]
+            clear = ~_back_at(still._replace(back=self.front), place, radius, WITHIN)
+            shown, behind = shown[clear], behind[clear]
         if behind.size < 8:
             return True
-        unlike = np.count_nonzero(np.abs(behind - shade) > 0.45 * abs(self.look.contrast))
-        return bool(unlike / behind.size > 0.6)
+        tells = np.abs(behind - shade) > 2 * self.look.noise + 0.05 * abs(self.look.contrast)
+        bob = tells & (np.abs(shown - shade) < np.abs(shown - behind))
+        return bool(tells.mean() > 0.65 and bob.sum() > 0.75 * tells.sum())
 
     def _unlike(self, patch: Patch, place: Place) -> float:
         """How much of a bob with a pattern differs from what stands still where it is."""
         radius = self.look.radius_px
-        behind = _back_at(patch, place, radius, WITHIN)
+        behind = _back_at(patch, place, radius, WITHIN) * light_on(patch)
         shown = _back_at(patch._replace(back=patch.image), place, radius, WITHIN)
         return float(np.mean(np.abs(shown - behind) > 0.2 * abs(self.look.contrast) + 4)) if behind.size else nan
 
@@ -384,7 +394,9 @@ class Follower(Known):
         dx, dy = shift.at(place.x_px, place.y_px)
         qx, qy = shift.at(px, py)
         bob = (place.x_px + dx, place.y_px + dy)
-        line = measure_string(frame.luma, bob, (px + qx, py + qy), self.look.radius_px)
+        line = measure_string(frame.luma, bob, (px + qx, py + qy), self.look.radius_px, self.unsteady)
+        if line is None and self.unsteady:  # a small swing's arc, and a hand: the string hangs about straight down
+            line = measure_string(frame.luma, bob, (bob[0], 0.0), self.look.radius_px)
         if line is not None:
             sx, sy = shift.at(line.x_px, line.y_px)
             self.record.string[len(self.record.index) - 1] = (
