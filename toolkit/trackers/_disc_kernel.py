@@ -2,8 +2,8 @@
 
 `gather` lists the pixels that matter, `cover_still` and `cover_moving` say how much of each the bob hides, `fit` steps
 towards the least sum of squares until the disc lies still. Plain pointers and few calls, so that it compiles in seconds;
-the listed pixels are worked through in chunks that stay in the processor's nearest memory, in plain loops that write one
-to three lists each, for then the compiler makes vector instructions of them.
+the listed pixels are worked through in chunks that stay in the processor's nearest memory, in plain loops, for then the
+compiler makes vector instructions of them.
 """
 
 from __future__ import annotations
@@ -80,30 +80,39 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
         hole = math.sqrt(hole) if hole > 0.0 else 0.0
         skips = places[INSIDE] == 0 or row & 1 == 1
         image_row, back_row, seen_row = row * places[IMAGE_ROW], row * places[BACK_ROW], row * places[SEEN_ROW]
-        column = math.ceil(cx - half) if cx > half else 0
-        last = math.floor(cx + half)
-        last = last if last < columns else columns - 1
-        while column <= last:
-            dx = column - cx
-            square = dx * dx + dy * dy
-            along = dx * sx + dy * sy
-            keep = (along <= 0.0) | (along * along <= wedge * square)
-            if reach > 0.0:  # across its way the streak is narrow
-                d = math.sqrt(square) + 1e-9
-                off = (d - radius) * d
-                near = band * d + abs(bx * dx + by * dy)
-                keep &= (off <= near) & ((not skips and column & 1 == 0) or off >= -near)
-            x[count] = column
-            y[count] = row
-            bright[count] = image[image_row + column]
-            wall[count] = back[back_row + column]
-            n = seen[seen_row + column]
-            keep &= n >= 0.0
-            known[count] = n if n > 0.0 else 1.0 / 3.0
-            count += keep
-            column += 1
-            if abs(column - cx) < hole:
-                column = math.ceil(cx + hole) if skips else column + (column & 1)
+        first = math.ceil(cx - half) if cx > half else 0
+        end = min(math.floor(cx + half) + 1, columns)
+        left = min(max(math.ceil(cx - hole), first), end)
+        right = min(max(math.ceil(cx + hole), left), end)
+        held = abs(sx) * outer + dy * sy > 0.0  # may the string be in this row?
+        for part in range(3):  # the outline, what is within it, the outline
+            column, until, step = first, left, 1
+            if part == 1:
+                if skips:
+                    continue
+                column, until, step = left + (left & 1), right, 2
+            elif part == 2:
+                column, until = right, end
+            while column < until:
+                times = seen[seen_row + column]
+                keep = times >= 0.0
+                dx = column - cx
+                square = dx * dx + dy * dy
+                if held:
+                    along = dx * sx + dy * sy
+                    keep &= (along <= 0.0) | (along * along <= wedge * square)
+                if reach > 0.0:  # across its way the streak is narrow
+                    d = math.sqrt(square) + 1e-9
+                    off = (d - radius) * d
+                    near = band * d + abs(bx * dx + by * dy)
+                    keep &= (off <= near) & ((not skips and column & 1 == 0) or off >= -near)
+                x[count] = column
+                y[count] = row
+                bright[count] = image[image_row + column]
+                wall[count] = back[back_row + column]
+                known[count] = times if times > 0.0 else 1.0 / 3.0
+                count += keep
+                column += step
     return count
 
 
@@ -137,10 +146,18 @@ def measure_depth(
 
 
 @loop
-def cover_still(depth: Any, n: int, soft: float, share: Any, rise: Any, widen: Any) -> None:
-    """What a disc at rest covers of each pixel, and its slopes with the radius and with h."""
+def cover_still(
+    x: Any, y: Any, n: int, cx: float, cy: float, radius: float, soft: float,
+    near: Any, share: Any, rise: Any, widen: Any,
+) -> None:  # fmt: skip
+    """What a disc at rest covers of each pixel, its slopes with the radius and with h, and one over the pixel's distance from
+    the centre."""
     for i in range(n):
-        v = depth[i]
+        dx, dy = x[i] - cx, y[i] - cy
+        square = dx * dx + dy * dy + 1e-18
+        one = 1.0 / math.sqrt(square)
+        near[i] = one
+        v = (radius - one * square) / soft
         v = 1.0 if v > 1.0 else -1.0 if v < -1.0 else v
         q = v * v
         share[i] = 0.5 + v * (E0 + q * (E1 + q * (E2 + q * (E3 + q * E4))))
@@ -179,7 +196,7 @@ def cover_moving(
 @loop
 def compare(
     x: Any, y: Any, n: int, bright: Any, wall: Any, known: Any, disc: Any, shade: Any, cut: float,
-    share: Any, rest: Any, work: Any,
+    share: Any, rest: Any, work: Any, free: int,
 ) -> None:  # fmt: skip
     """Slopes of the model with all eight parameters, what it leaves of the picture, and each pixel's weight."""
     rise, widen, near, weight = skip(work, _RISE), skip(work, _WIDEN), skip(work, _NEAR), skip(work, _WEIGHT)
@@ -189,26 +206,27 @@ def compare(
     cx, cy = disc[0], disc[1]
     f0, fx, fy, gain = shade[0], shade[1], shade[2], shade[3]
     for i in range(n):
-        tilt_x[i] = x[i] - cx
-        tilt_y[i] = y[i] - cy
-    for i in range(n):
-        by_soft[i] = f0 + fx * tilt_x[i] + fy * tilt_y[i] - gain * wall[i]
-    for i in range(n):
-        rest[i] = bright[i] - gain * wall[i] - by_soft[i] * share[i]
-    for i in range(n):
-        bare = 1.0 - share[i]
+        dx, dy, part = x[i] - cx, y[i] - cy, share[i]
+        level, bare = gain * wall[i], 1.0 - share[i]
+        step = f0 + fx * dx + fy * dy - level
+        off = bright[i] - level - step * part
+        rest[i] = off
         by_gain[i] = bare * wall[i]
-        weight[i] = known[i] / (known[i] + bare * bare) if abs(rest[i]) <= cut else 0.0
+        by_soft[i] = step
+        weight[i] = known[i] / (known[i] + bare * bare) if abs(off) <= cut else 0.0
     for i in range(n):
-        by_radius[i] = by_soft[i] * rise[i]
-        by_soft[i] *= widen[i]
-    for i in range(n):
-        flat[i] = share[i]
-        by_x[i] = by_radius[i] * near[i] * tilt_x[i] - fx * share[i]
-        by_y[i] = by_radius[i] * near[i] * tilt_y[i] - fy * share[i]
-    for i in range(n):
-        tilt_x[i] *= share[i]
-        tilt_y[i] *= share[i]
+        dx, dy, part = x[i] - cx, y[i] - cy, share[i]
+        slope = by_soft[i] * rise[i]
+        by_radius[i] = slope
+        slope *= near[i]
+        flat[i] = part
+        by_x[i] = slope * dx - fx * part
+        by_y[i] = slope * dy - fy * part
+        tilt_x[i] = dx * part
+        tilt_y[i] = dy * part
+    if free == _P:
+        for i in range(n):
+            by_soft[i] *= widen[i]
 
 
 @loop
@@ -222,27 +240,37 @@ def add_up(work: Any, rest: Any, n: int, free: int, normal: Any, right: Any) -> 
         weights += weight[i]
     right[8] += squares
     right[9] += weights
-    for a in range(free):
-        mine = skip(work, a * CHUNK)
+    for a in range(0, free, 2):
+        first, second = skip(work, a * CHUNK), skip(work, (a + 1) * CHUNK)
         for b in range(0, a + 1, 4):
             c0, c1, c2, c3 = (
                 skip(work, b * CHUNK), skip(work, (b + 1) * CHUNK), skip(work, (b + 2) * CHUNK), skip(work, (b + 3) * CHUNK)
             )  # fmt: skip
-            s0 = s1 = s2 = s3 = total = 0.0
+            s0 = s1 = s2 = s3 = t0 = t1 = t2 = t3 = s_rest = t_rest = 0.0
             for i in range(n):
-                weighted = weight[i] * mine[i]
-                s0 += weighted * c0[i]
-                s1 += weighted * c1[i]
-                s2 += weighted * c2[i]
-                s3 += weighted * c3[i]
-                total += weighted * rest[i]
+                s, t = weight[i] * first[i], weight[i] * second[i]
+                s0 += s * c0[i]
+                s1 += s * c1[i]
+                s2 += s * c2[i]
+                s3 += s * c3[i]
+                t0 += t * c0[i]
+                t1 += t * c1[i]
+                t2 += t * c2[i]
+                t3 += t * c3[i]
+                s_rest += s * rest[i]
+                t_rest += t * rest[i]
             row = skip(normal, _P * a + b)
             row[0] += s0
             row[1] += s1
             row[2] += s2
             row[3] += s3
+            row[_P] += t0
+            row[_P + 1] += t1
+            row[_P + 2] += t2
+            row[_P + 3] += t3
             if b == 0:
-                right[a] += total
+                right[a] += s_rest
+                right[a + 1] += t_rest
 
 
 @_once
@@ -363,10 +391,10 @@ def fit(places: Any) -> None:
             x, y, bright = skip(lists, begin), skip(lists, _Y * most + begin), skip(lists, _BRIGHT * most + begin)
             wall, known = skip(lists, _WALL * most + begin), skip(lists, _KNOWN * most + begin)
             share, rest = skip(lists, _SHARE * most + begin), skip(lists, _REST * most + begin)
-            measure_depth(x, y, n, cx, cy, radius, soft, depth, near)
             if length < 0.05:
-                cover_still(depth, n, soft, share, rise, widen)
+                cover_still(x, y, n, cx, cy, radius, soft, near, share, rise, widen)
             else:
+                measure_depth(x, y, n, cx, cy, radius, soft, depth, near)
                 for i in range(n):
                     across = (bx * (y[i] - cy) - by * (x[i] - cx)) * near[i] / pieces
                     lift[i] = across * across * near[i] / (12.0 * soft)
@@ -377,7 +405,7 @@ def fit(places: Any) -> None:
                     part = 1.0 / pieces if k > 0 else 0.0
                     cover_moving(depth, lift, n, part, soft, before, edge, whole, share, rise, widen)
                 measure_depth(x, y, n, cx, cy, radius, soft, depth, near)
-            compare(x, y, n, bright, wall, known, disc, shade, cut, share, rest, work)
+            compare(x, y, n, bright, wall, known, disc, shade, cut, share, rest, work, free)
             add_up(work, rest, n, free, normal, right)
         if not invert(normal, free, step):
             return
