@@ -224,6 +224,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     places = Places.of(record, t - t[0])
     _require_seen(places, video)
     shake = Shake(follower, places.good)
+    if follower.unsteady:
+        shake.look_at_string(places, _strings(record, places, shake, look.radius_px, fps_factor))
     places = replace(places, x_px=places.x_px + shake.raw_x - shake.x, y_px=places.y_px + shake.raw_y - shake.y)
     stamps = places.t_s
 
@@ -240,7 +242,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     good = places.good
     misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
     off_px = misfit * look.radius_px / 3
-    strings = _strings(record, places, look.radius_px, fps_factor)
+    strings = _strings(record, places, shake, look.radius_px, fps_factor)
     camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor)
     lines = strings.seen()
     joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
@@ -351,12 +353,13 @@ def _require_seen(places: Places, video: Video) -> None:
         raise JobError(f"the bob was seen on only {seen} of {of} frames of {video.path}; {REMEDY}")
 
 
-def _strings(record: Record, places: Places, radius_px: float, fps_factor: float) -> Lines:
-    """The string's line on each frame, NaN where none was seen."""
+def _strings(record: Record, places: Places, shake: Shake, radius_px: float, fps_factor: float) -> Lines:
+    """The string's line on each frame, NaN where none was seen, in the pixels of a still camera."""
     lines = np.full((places.t_s.size, 5), np.nan)
     for k, line in record.string.items():
         lines[k] = line
     x, y, angle, angle_sigma, sigma = lines.T
+    x, y = x + shake.raw_x - shake.x, y + shake.raw_y - shake.y
     half = seen_half(np.hypot(x - places.x_px, y - places.y_px), radius_px)
     return Lines(x, y, angle, angle_sigma, sigma, half, places.t_s / fps_factor)
 

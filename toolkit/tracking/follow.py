@@ -395,8 +395,9 @@ class Follower(Known):
         qx, qy = shift.at(px, py)
         bob = (place.x_px + dx, place.y_px + dy)
         line = measure_string(frame.luma, bob, (px + qx, py + qy), self.look.radius_px, self.unsteady)
-        if line is None and self.unsteady:  # a small swing's arc, and a hand: the string hangs about straight down
-            line = measure_string(frame.luma, bob, (bob[0], 0.0), self.look.radius_px)
+        if self.unsteady:  # what a hand makes of a small swing tells no direction: or about straight down
+            other = measure_string(frame.luma, bob, (bob[0], 0.0), self.look.radius_px)
+            line = max((one for one in (line, other) if one is not None), key=lambda one: one.strength, default=None)
         if line is not None:
             sx, sy = shift.at(line.x_px, line.y_px)
             self.record.string[len(self.record.index) - 1] = (

@@ -57,7 +57,11 @@ def fit_jointly(
         # the picture's own places hold the shake, which is smooth, but not the error with which it was measured
         picture = rx + shake.x[good], ry + shake.y[good]
         own = true_sigma(t[good], picture, (sx, sy), velocity, 0 * shake.sigma[good], time_sigma_s, rough=True)
-        return found._replace(x=own.x, y=own.y)
+        if not shake.by_string:
+            return found._replace(x=own.x, y=own.y)
+        # by the string each place is at its length from the pivot, and what strays is along the motion: the camera's roll
+        left = float(np.mean(rx**2 + ry**2)) - float(np.mean(shake.sigma[good] ** 2))
+        return Factors(own.x, own.y, float(np.sqrt(max(left, 0.0))))
 
     start = swing.values_at(t[good][0], camera.fps_factor)
     when = t / camera.fps_factor

@@ -10,7 +10,9 @@ from toolkit.sentence import said
 from toolkit.tracking.follow import Follower
 from toolkit.tracking.places import Places
 from toolkit.tracking.stillness import CameraShift
+from toolkit.tracking.string_shake import shake_on_string
 from toolkit.tracking.swing import Swing, fit_swing
+from toolkit.tracking.view_fit import Lines
 
 _EVENER = 0.7  # times what places stray from a swing: less, without the shake, and there was none
 _CHECKS = 4  # looks at the background that it takes to say that the camera stood still
@@ -21,6 +23,7 @@ class Shake:
 
     raw_x, raw_y (n,) were taken away while following (0 where the camera seemed to stand still), x, y (n,) are to be, which leaves each
     frame `sigma` (n,) px. `taken` is False where the camera stood still as far as could be seen; then it may have moved by `unseen_px`.
+    `by_string` is True where not the background told it but the string.
     """
 
     def __init__(self, follower: Follower, good: np.ndarray) -> None:
@@ -30,6 +33,7 @@ class Shake:
         self.x, self.y = self.raw_x, self.raw_y
         self.extent_px = np.zeros(2)
         self.taken = follower.shaking
+        self.by_string = False
         checks = [np.hypot(s.x_px, s.y_px) + 3 * s.sigma_px for s in follower.checks.values()]
         self.unseen_px = float(np.max(checks)) if len(checks) >= _CHECKS and not self.taken else np.inf
         row = {index: k for k, index in enumerate(r.index)}
@@ -53,10 +57,30 @@ class Shake:
         self.sigma = np.full(n, noise)
         self.extent_px = np.ptp(shifts, axis=0)[:2]
 
+    def look_at_string(self, places: Places, lines: Lines) -> None:
+        """Where the background shows no shake, let the string's lines tell it."""
+        found = None if self.taken else shake_on_string(places, lines)
+        if found is not None:
+            moved, noise = _smoothed(found[0])
+            self.x, self.y = moved.T
+            self.sigma = np.maximum(found[1], noise)
+            self.extent_px = np.ptp(moved, axis=0)
+            self.taken = self.by_string = True
+
     def told(self) -> list[str]:
         """A sentence on the shake that was taken away, if any."""
         if not (self.taken and self.extent_px.any()):
             return []
+        if self.by_string:
+            return [
+                said(
+                    "track.shake_by_string",
+                    "The camera moved by up to {across_px:.1f} px across and {down_px:.1f} px down before a wall that shows nothing; "
+                    "this was measured on the string and taken away. A roll of the camera is left in the angles.",
+                    across_px=float(self.extent_px[0]),
+                    down_px=float(self.extent_px[1]),
+                )
+            ]
         return [
             said(
                 "track.shake",
@@ -79,7 +103,7 @@ class Shake:
         if still is None or still.rms_px > _EVENER * swing.rms_px:
             return places, swing
         self.x, self.y, self.sigma = np.zeros_like(x), np.zeros_like(y), np.zeros_like(x)
-        self.taken = False
+        self.taken = self.by_string = False
         return replace(places, x_px=x, y_px=y), still
 
 

@@ -32,9 +32,13 @@ _ROOM = 4096  # numbers that the kernel works in, and more
 
 
 def measure_string(
-    luma: np.ndarray, bob: tuple[float, float], pivot: tuple[float, float], radius_px: float
+    luma: np.ndarray, bob: tuple[float, float], pivot: tuple[float, float], radius_px: float, far: bool = False
 ) -> StringLine | None:
-    """The string in one frame from where bob and pivot are thought to be; None where no string is seen."""
+    """The string in one frame from where bob and pivot are thought to be; None where no string is seen. It is looked for as far
+    as the pivot or, where that is farther (or with `far`, whatever it is), the picture's rim."""
+    reach = _to_rim(luma.shape, bob, pivot)
+    if far or reach < 1.0:
+        pivot = bob[0] + reach * (pivot[0] - bob[0]), bob[1] + reach * (pivot[1] - bob[1])
     numbers, out, room = np.array([*bob, *pivot, radius_px, _start(radius_px)]), np.zeros(8), np.empty(_ROOM)
     addresses = luma.ctypes.data, address(numbers), address(out), address(room)
     ridge = kernel("ridge", "toolkit.tracking._string_kernel", "the string's measurement")
@@ -48,6 +52,12 @@ def measure_string(
 def seen_half(distance_px: np.ndarray, radius_px: float) -> np.ndarray:
     """Half the length of the piece of string that was measured, from how far the line's point is from the bob's centre."""
     return np.asarray(distance_px - _start(radius_px))
+
+
+def _to_rim(shape: tuple[int, ...], bob: tuple[float, float], pivot: tuple[float, float]) -> float:
+    """How far it is from the bob by the pivot to the picture's rim, in distances to the pivot."""
+    ways = [((0.0 if q < p else size - 1.0) - p) / (q - p) for p, q, size in zip(bob, pivot, reversed(shape)) if q != p]
+    return max(0.0, min(ways, default=1.0))
 
 
 def _start(radius_px: float) -> float:
