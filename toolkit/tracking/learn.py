@@ -38,7 +38,7 @@ class Trial(NamedTuple):
 
     def finds_more_than(self, other: Trial) -> bool:
         """Does it find the bob on more frames, and no less calmly?"""
-        return self.found > 1.05 * other.found and self.swing.rms_px <= other.swing.rms_px
+        return self.found > 1.05 * other.found and self.swing.rms_px <= 1.05 * other.swing.rms_px
 
 
 class Known:

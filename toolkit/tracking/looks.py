@@ -68,8 +68,7 @@ def learn_looks(
 ) -> Looks | None:
     """The looks of the bob seen, from about `look`; its `radius` if that is known. None where hardly a fit succeeds."""
     speed = np.hypot(seen.vx, seen.vy)
-    slow = np.argsort(speed)[: max(8, speed.size // 4)]
-    slow = slow[:: max(1, slow.size // 16)][:16]
+    slow = _slow(seen, speed, look.radius_px, shape)
     fast = np.argsort(-speed)[:10]
     walls = [w for w in (seen.noise(k, look) for k in slow) if np.isfinite(w)]
     drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(walls or [0.0]))  # more misfit than noise leaves
@@ -100,6 +99,20 @@ def learn_looks(
             break
         learned = learned._replace(exposure_s=exposure_s)
     return learned
+
+
+def _slow(seen: Sightings, speed: np.ndarray, radius_px: float, shape: tuple[int, ...]) -> np.ndarray:
+    """Up to 16 sightings on which the bob is slow, whole in the picture; where hardly one of them is on the left, or on the
+    right, as many from either side, for the bob may be larger there."""
+    rim = np.min([seen.x_px, seen.y_px, shape[1] - 1 - seen.x_px, shape[0] - 1 - seen.y_px], axis=0)
+    order = np.argsort(speed)
+    slow = order[: max(8, speed.size // 4)]
+    slow = slow[:: max(1, slow.size // 16)][:16]
+    whole, left = rim >= radius_px + 2, seen.x_px < np.median(seen.x_px)
+    sides = [order[whole[order] & side[order]] for side in (left, ~left)]
+    if min(np.count_nonzero(whole[slow] & left[slow]), np.count_nonzero(whole[slow] & ~left[slow])) >= 4:
+        return slow
+    return np.concatenate([side[:8] for side in sides]) if min(map(len, sides)) >= 4 else slow
 
 
 def _whole(fit: np.ndarray, found_px: float, shape: tuple[int, ...]) -> bool:
