@@ -282,7 +282,7 @@ def test_a_repeated_picture_near_a_turning_point_is_left_out():
         x[k], y[k] = x[k - 1], y[k - 1]
     swing = fit_swing(t, x, y, np.full(t.size, 0.1), start_swing(t, x, y))
     assert swing is not None
-    left_out = out_of_time(placed(t, x, y), swing, [], [])
+    left_out = out_of_time(placed(t, x, y), swing, *swing.position(t))
     assert set(slow) <= set(np.flatnonzero(left_out).tolist())
     assert left_out.sum() <= len(slow) + 2
 
@@ -324,4 +324,4 @@ def test_single_frames_far_from_those_about_them_are_left_out_and_a_slow_error_i
     assert np.flatnonzero(found).tolist() == astray
     assert [sentence.key for sentence in strays_told(placed(t, x, y), found)] == ["track.lone_strays"]
     x[::5] += 0.8  # so many: something else is amiss
-    assert not lone_strays(placed(t, x, y), *swing.position(t)).any()
+    assert lone_strays(placed(t, x, y), *swing.position(t)) is None

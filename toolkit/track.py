@@ -17,7 +17,7 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
-from toolkit.tracking.clock import even_times, lone_strays, out_of_time, slips_told, strays_told, timed_swing
+from toolkit.tracking.clock import even_times, late_told, lone_strays, out_of_time, slips_told, strays_told, timed_swing
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.joint import Camera, fit_jointly
 from toolkit.tracking.places import Places
@@ -235,9 +235,10 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         places, swing = shake.checked(places, swing)
     log += shake.told()
     require_pendulum(swing, places, size_px, video.path)
-    places = places.without(out_of_time(places, swing, log, warnings))
-    stray = lone_strays(places, *swing.position(places.t_s))
-    places = places.without(stray)
+    found, drawn = places, swing.position(places.t_s)
+    untimely = out_of_time(found, swing, *drawn)
+    stray = lone_strays(found.without(untimely), *drawn)
+    places = found.without(untimely if stray is None else untimely | stray)
 
     good = places.good
     misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
@@ -246,12 +247,16 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor)
     lines = strings.seen()
     joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
-    missed = lone_strays(places, joint.x_px, joint.y_px)  # hidden while tilt, lens and shutter were not taken out
-    if missed.any():
-        places = places.without(missed)
-        good = places.good
+    drawn = joint.x_px, joint.y_px  # with tilt, lens and shutter taken out: some are no strays, and others hid in these
+    untimely = out_of_time(found, swing, *drawn)
+    again = lone_strays(found.without(untimely), *drawn, sure=good & ~untimely)
+    stray = stray if again is None else again
+    left = found.without(untimely if stray is None else untimely | stray)
+    if not np.array_equal(left.good, good):
+        places, good = left, left.good
         joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
-    log += strays_told(places, stray | missed)
+    late_told(places, untimely, log, warnings)
+    log += strays_told(places, stray)
 
     rx, ry = ((p - m)[good] for p, m in ((places.x_px, joint.x_px), (places.y_px, joint.y_px)))
     rms_px = float(np.sqrt(0.5 * np.mean(rx**2 + ry**2)))

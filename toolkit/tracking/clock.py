@@ -59,11 +59,11 @@ def even_times(t: np.ndarray, video: Video, log: list[str]) -> np.ndarray:
     return grid + 0.5 * (off.max() + off.min())
 
 
-def out_of_time(places: Places, swing: Swing, log: list[str], warnings: list[str]) -> np.ndarray:
-    """Frames whose picture does not belong to their time stamp: repeats of the one before, and leaps along the motion."""
+def out_of_time(places: Places, swing: Swing, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
+    """Frames (n,) bool whose picture does not belong to their time stamp: repeats of the one before, and leaps along the motion,
+    which has the bob at x_px, y_px (n,)."""
     t, good = places.t_s, places.good
-    mx, my = swing.position(t)
-    rx, ry = places.x_px - mx, places.y_px - my
+    rx, ry = places.x_px - x_px, places.y_px - y_px
     vx, vy = swing.velocity(t)
     speed = np.hypot(vx, vy) + 1e-9
     along = (rx * vx + ry * vy) / speed
@@ -75,7 +75,12 @@ def out_of_time(places: Places, swing: Swing, log: list[str], warnings: list[str
     again = np.abs(off + step) < 4 * noise + 0.2 * step  # where the bob was one frame before
     leap = good & (step > 6 * noise) & (again | (step > 0.3 * float(step.max())))
     leap &= (np.abs(off) > np.maximum(8 * noise, 0.5 * step)) & (np.abs(across) < 4 * noise + 0.5 * step)
-    repeats = places.repeated & (step > 4 * noise) & good
+    return leap | (places.repeated & (step > 4 * noise) & good)
+
+
+def late_told(places: Places, late: np.ndarray, log: list[str], warnings: list[str]) -> None:
+    """Sentences on the frames (n,) bool that were left out as out of time, if any."""
+    t, repeats, leap = places.t_s, late & places.repeated, late & ~places.repeated
     if repeats.any():
         log.append(
             said(
@@ -85,7 +90,6 @@ def out_of_time(places: Places, swing: Swing, log: list[str], warnings: list[str
                 t_s=float(t[np.flatnonzero(repeats)[0]]),
             )
         )
-    leap &= ~repeats
     if leap.any():  # a few are left out and done with; many mean a clock that cannot be trusted
         (log if leap.mean() < _LEFT_OUT else warnings).append(
             said(
@@ -96,7 +100,6 @@ def out_of_time(places: Places, swing: Swing, log: list[str], warnings: list[str
                 t_s=float(t[np.flatnonzero(leap)[0]]),
             )
         )
-    return leap | repeats
 
 
 def timed_swing(followed: Swing, places: Places, path: Path, warnings: list[str]) -> tuple[Places, Swing]:
@@ -159,22 +162,26 @@ def _lost_told(stamps: np.ndarray, t_s: np.ndarray) -> str:
     )
 
 
-def lone_strays(places: Places, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
-    """Frames (n,) bool on which the bob was found far from where the motion (n,) and the frames about it have it: a picture
-    shown again, a post or a passer-by taken for it. None where they are so many that something else is amiss."""
+def lone_strays(
+    places: Places, x_px: np.ndarray, y_px: np.ndarray, sure: np.ndarray | None = None
+) -> np.ndarray | None:
+    """Frames (n,) bool on which the bob was found far from where the motion (n,) and the frames about it (those that are
+    `sure`, (n,) bool, if it is known which) have it: a picture shown again, a post or a passer-by taken for it. None where they
+    are so many that something else is amiss."""
+    sure = places.good if sure is None else sure
     rest = np.array([places.x_px - x_px, places.y_px - y_px])
-    apart = rest - [_running_median(r, places.good) for r in rest]
-    usual = 1.4826 * np.median(np.abs(apart[:, places.good]), axis=1, keepdims=True) + _LEAST_PX / _STRAY
+    apart = rest - [_running_median(r, sure) for r in rest]
+    usual = 1.4826 * np.median(np.abs(apart[:, sure]), axis=1, keepdims=True) + _LEAST_PX / _STRAY
     stray = places.good & (np.hypot(*apart / usual) > _STRAY)
     if stray.sum() >= _LEFT_OUT * stray.size:
-        return np.zeros(stray.size, bool)
+        return None
     stray[stray] = ~_lead_on(rest / usual, places.good & ~stray, np.flatnonzero(stray))
     return stray
 
 
-def strays_told(places: Places, stray: np.ndarray) -> list[str]:
+def strays_told(places: Places, stray: np.ndarray | None) -> list[str]:
     """A sentence on the frames (n,) bool that were left out as strays, if any."""
-    if not stray.any():
+    if stray is None or not stray.any():
         return []
     return [
         said(
