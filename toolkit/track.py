@@ -233,7 +233,6 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     places, swing = timed_swing(followed, places, video.path, warnings)
     if shake.taken:
         places, swing = shake.checked(places, swing)
-    log += shake.told()
     require_pendulum(swing, places, size_px, video.path)
     found, drawn = places, swing.position(places.t_s)
     untimely = out_of_time(found, swing, *drawn)
@@ -255,6 +254,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     if not np.array_equal(left.good, good):
         places, good = left, left.good
         joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
+    log += shake.told(joint.factors.shake_px)
     late_told(places, untimely, log, warnings)
     log += strays_told(places, stray)
 
@@ -262,11 +262,12 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     rms_px = float(np.sqrt(0.5 * np.mean(rx**2 + ry**2)))
     sx, sy = places.sigma_x_px * joint.factors.x, places.sigma_y_px * joint.factors.y
     late = time_sigma * np.hypot(*swing.velocity(places.t_s))
-    typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + shake.sigma**2)[good])))
+    borne = joint.factors.shake_px if shake.by_string else 0.0  # it strays so far, and the angles' σ allows for it
+    typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + shake.sigma**2 + borne**2)[good])))
     motion = swing if joint.view is None else joint.view.swing(fps_factor)
     if not joint.factors.shake_px:  # a shaking camera leaps too
         warnings += slips_told(places, swing, joint.x_px, joint.y_px)
-    warnings += poor_motion(motion, places.t_s, good, rms_px, typical, look.radius_px)
+    warnings += poor_motion(motion, places.t_s, good, rms_px, typical, look.radius_px, shake.by_string)
     warnings += poor_picture(misfit, look.even, off_px, rms_px)
     for odd in clock_warnings(stamps, video):  # what the stamps account for affects no result
         (log if getattr(odd, "key", "") in _HARMLESS else warnings).append(odd)

@@ -67,8 +67,8 @@ class Shake:
             self.extent_px = np.ptp(moved, axis=0)
             self.taken = self.by_string = True
 
-    def told(self) -> list[str]:
-        """A sentence on the shake that was taken away, if any."""
+    def told(self, left_px: float = 0.0) -> list[str]:
+        """A sentence on the shake that was taken away, if any, and on what of it was left."""
         if not (self.taken and self.extent_px.any()):
             return []
         if self.by_string:
@@ -76,9 +76,11 @@ class Shake:
                 said(
                     "track.shake_by_string",
                     "The camera moved by up to {across_px:.1f} px across and {down_px:.1f} px down before a wall that shows nothing; "
-                    "this was measured on the string and taken away. A roll of the camera is left in the angles.",
+                    "this was measured on the string and taken away. What is left, {left_px:.2f} px (a roll of the camera turns the "
+                    "string too), is in the error bars of the angles.",
                     across_px=float(self.extent_px[0]),
                     down_px=float(self.extent_px[1]),
+                    left_px=left_px,
                 )
             ]
         return [

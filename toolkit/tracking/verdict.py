@@ -16,6 +16,7 @@ from toolkit.tracking.swing import Swing
 _POOR_PICTURE = 0.12  # of the contrast
 _STRAYS_PX = 0.1  # less does not stray, whatever its error bar
 _STRAYS = 0.04  # of the bob's radius: more does
+_ROLLS = 0.1  # of the bob's radius: what strays less may be the roll of a camera that a hand is known to hold
 _ENDLESS = 20  # so many times longer than the clip, half a period is no swing
 _STRAIGHT = 20  # diagonals of the picture: a pivot farther off is none
 _STRETCH = 3.0  # periods
@@ -98,10 +99,16 @@ def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:
 
 
 def poor_motion(
-    swing: Swing, t: np.ndarray, good: np.ndarray, rms_px: float, sigma_px: float, radius_px: float
+    swing: Swing,
+    t: np.ndarray,
+    good: np.ndarray,
+    rms_px: float,
+    sigma_px: float,
+    radius_px: float,
+    held: bool = False,
 ) -> list[str]:
     """Sentences on a motion that was accepted, but is not quite that of a pendulum; `rms_px` is how far places stray from
-    it as the camera saw it, `sigma_px` a place's error bar."""
+    it as the camera saw it, `sigma_px` a place's error bar. `held` if the string shows that a hand holds the camera."""
     poor: list[str] = []
     growth, sigma = _growth(swing, t[good])
     if growth > 0.02 + 4 * sigma:
@@ -113,7 +120,7 @@ def poor_motion(
                 share=float(np.expm1(growth)),
             )
         )
-    if rms_px > max(_STRAYS_PX, min(3 * sigma_px, _STRAYS * radius_px)):
+    if rms_px > max(_STRAYS_PX, min(3 * sigma_px, (_ROLLS if held else _STRAYS) * radius_px)):
         poor.append(
             said(
                 "track.strays",
