@@ -98,7 +98,7 @@ _SPACING = 0.3  # of the points of one period, in 1/ω_g: the nearest singularit
 def _sample_period(motion: _Motion, rate: float, direction: float, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """θ and θ̇ at the increasing times t from Taylor series about equally spaced points of one period."""
     from toolkit.motion.compiled import address, call, kernel
-    from toolkit.motion.routes import ROW
+    from toolkit.motion.routes import ROW, SPARE
 
     points = 2 * math.ceil(motion.period_s * rate * max(1.0, motion.kappa) / _SPACING / 2)
     phase = np.arange(-points // 2, points // 2 + 1) / points
@@ -106,12 +106,11 @@ def _sample_period(motion: _Motion, rate: float, direction: float, t: np.ndarray
     angle, velocity = solution(phase, motion.kappa, motion.kappa_c)
     over = float(motion.kind == "rotation")
     period = (motion.period_s, motion.period_lost, motion.phase0, direction, motion.turns, over, rate * rate)
-    times = np.zeros(t.size + 7)  # vectors of eight may reach beyond the last one
-    times[: t.size] = t
+    times = t if t.flags.c_contiguous and t.flags.writeable else t.copy()
     out = np.empty((2, t.size))
     arrays = (
         np.array([t.size, points]), np.array(period), times, np.array([angle, (direction * rate) * velocity]),
-        np.empty(16 + 2 * ROW * (points + 2)), out,
+        np.empty(SPARE + 2 * ROW * (points + 2)), out,
     )  # fmt: skip
     call(kernel("orbit"), *map(address, arrays))
     return out[0], out[1]

@@ -51,10 +51,12 @@ class Jet:
             raise NotAnalytic
         q = len(self.writer.inner)
         parts = [f"q[{q + i}] * W[{(3 + column) * ROW} + k]" for i, column in enumerate(self.writer.matrix[0])]
-        force = f"W[{2 * ROW} + k] = {' + '.join(parts) or '0.0'}"
+        force = f"f = W[{2 * ROW} + k] = {' + '.join(parts) or '0.0'}"
         ends = [f"W[n] = W[{ROW} + n - 1] * R[n]", f"W[{ROW} + n] = W[{2 * ROW} + n - 1] * R[n]"]
-        states = [f"W[k] = W[{ROW} + k - 1] * R[k]", f"W[{ROW} + k] = W[{2 * ROW} + k - 1] * R[k]"]
-        jet = _function("jet", ["W[0] = s[1]", f"W[{ROW}] = s[2]", *at_first, force], [*states, *at_each, force], ends)
+        states = ["W[k] = w * R[k]", f"w = W[{ROW} + k] = f * R[k]"]
+        jet = _function(
+            "jet", ["W[0] = s[1]", f"w = W[{ROW}] = s[2]", *at_first, force], [*states, *at_each, force], ends
+        )
         return f"{jet}\n\n{_function('more', self.first, self.each, [])}\n\nN_WORK = {self.count}\n"
 
     def _basis(self, function: Any, row: int) -> None:
@@ -211,8 +213,9 @@ class Jet:
             r = self._constant(rate)
             self.first.append(f"v = {plain} + {r} * s[0]")
             self.each += [
-                f"W[{sine * ROW} + k] = {r} * W[{cosine * ROW} + k - 1] * R[k]",
-                f"W[{cosine * ROW} + k] = -{r} * W[{sine * ROW} + k - 1] * R[k]",
+                f"c{sine}, c{cosine} = {r} * R[k] * c{cosine}, -{r} * R[k] * c{sine}",
+                f"W[{sine * ROW} + k] = c{sine}",
+                f"W[{cosine * ROW} + k] = c{cosine}",
             ]
         else:
             a = self._row(angle)
@@ -239,15 +242,18 @@ class Jet:
                 f"    u += x * W[{cosine * ROW} + k - 2]",
                 f"    v += x * W[{sine * ROW} + k - 2]",
                 f"x = {last}",
-                f"u += x * W[{cosine * ROW} + k - 1]",
-                f"v += x * W[{sine * ROW} + k - 1]",
-                f"W[{sine * ROW} + k] = u * R[k]",
-                f"W[{cosine * ROW} + k] = -v * R[k]",
+                f"u = (u + x * c{cosine}) * R[k]",
+                f"v = (v + x * c{sine}) * R[k]",
+                f"c{sine}, c{cosine} = u, -v",
+                f"W[{sine * ROW} + k] = c{sine}",
+                f"W[{cosine * ROW} + k] = c{cosine}",
             ]
         self.first += [f"W[{sine * ROW}] = math.sin(v)", f"W[{cosine * ROW}] = math.cos(v)"]
         if angle == self.state["theta"]:  # what rounding took from θ counts after many turns
             self.first += [f"u, v = s[4] * W[{cosine * ROW}], s[4] * W[{sine * ROW}]"]
             self.first += [f"W[{sine * ROW}] += u", f"W[{cosine * ROW}] -= v"]
+        # the newest coefficients stay in registers: they need not be stored before they are used
+        self.first += [f"c{sine} = W[{sine * ROW}]", f"c{cosine} = W[{cosine * ROW}]"]
         return row
 
     def _exponential(self, expression: Any) -> int:

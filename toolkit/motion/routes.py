@@ -11,7 +11,7 @@ An integrator is given the addresses of eleven arrays, in this order:
     columns  the number of F's entries, then which basis function each entry belongs to
     values   the entries
     numbers  fastest rate, θ, w, start, tolerance, units of time in a second, then δθ, δw of each sensitivity at the start
-    t        scaled times, increasing, from the start on, and seven numbers more
+    t        scaled times, increasing, from the start on
     out      to be filled: θ, θ', then δθ, δθ' of each sensitivity, one row of samples each, θ' per second
     report   to be filled: status, steps, events, largest error, then (kind, τ, θ, w) of each event; with the event
              `slack` the run ends
@@ -28,8 +28,8 @@ from functools import cache
 import numpy as np
 
 ROW = 32  # Taylor coefficients kept of each basis function
-MAX_ORDER = ROW - 2
-SPARE = 24  # numbers of memory for samples that are still to be sorted
+MIN_ORDER, MAX_ORDER = 8, ROW - 2
+SPARE = 136  # numbers of memory for sampling
 MOST_EVENTS = 64
 DONE, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2
 

@@ -182,8 +182,7 @@ class _Work:
         layout, columns, self.take = solver.equation.layout(names)
         rows = code.N_WORK if is_series else code.N_BASIS
         count = solver.t_s.size
-        tau = np.zeros(count + 7)  # vectors of eight may reach beyond the last one
-        tau[:count] = solver.t_s / scale
+        tau = solver.t_s / scale
         self.sizes = _wholes(
             rows, *code.JACOBIAN_LENGTHS, code.SWITCHES, code.HOLDS, code.TIMED, k, count, 0,
             route.most_steps, address, further, *watched,
@@ -198,6 +197,7 @@ class _Work:
         self.loosest = route.loosest * self.accuracy
         span = 1.0 + 0.3 * float(tau[count - 1] - self.numbers[3]) if is_series or route.stages > 6 else 1.0
         self.first, self.settled = max(route.first * self.accuracy / span, route.floor), False
+        self.tolerance = 0.0
         arrays = (layout, columns, tau, np.empty(route.work_size(rows, k)), route.table)
         self.kept = arrays  # in memory, while their addresses are used
         at_layout, at_columns, at_tau, at_memory, at_table = (array.ctypes.data for array in arrays)
@@ -216,22 +216,31 @@ class _Work:
             self.q[len(coefficients) :] = [partials[i] for i in self.take]
         self.numbers[0] = self.code.fastest_rate(p, self.scale)
 
+    def _aim(self, tolerance: float) -> None:
+        """The tolerance of the steps to come, and the order of the series that suits it."""
+        self.tolerance = self.numbers[4] = tolerance
+        self.stages, self.method = self.route.stages, self.route.method
+        if not self.stages:
+            self.stages = min(max(int(4.0 - 0.8 * math.log(tolerance)), routes.MIN_ORDER), routes.MAX_ORDER)
+            self.method += f" {self.stages}"
+        self.sizes[8] = self.stages
+
     def run(self, start: tuple[float, float]) -> tuple[np.ndarray, float, str, SolveCost, tuple[Event, ...]] | None:
         """(out, error, method, cost, events); None where the route cannot hold the accuracy, or a term has no series."""
         began = time.process_time()
-        route, numbers, accuracy = self.route, self.numbers, self.accuracy
-        numbers[1], numbers[2] = start
+        route, accuracy = self.route, self.accuracy
+        self.numbers[1], self.numbers[2] = start
         out = np.empty(self.shape)
         self.places[7] = address(out)
         evaluations = total = 0
         tolerance = began_with = self.first
         for _attempt in range(6):
-            order = 0 if route.stages else min(max(int(4.0 - 0.8 * math.log(tolerance)), 6), routes.MAX_ORDER)
-            self.sizes[8], numbers[4] = order, tolerance
+            if tolerance != self.tolerance:
+                self._aim(tolerance)
             self.integrate(self.scratch, None, self.at)
             status, steps, found, error = self.report[:4]
             total += int(steps)
-            evaluations += int(steps) * (route.stages or order)
+            evaluations += int(steps) * self.stages
             if status != routes.DONE or error <= accuracy or tolerance <= route.floor:
                 break
             tolerance = max(tolerance * 0.1 * accuracy / error, route.floor)
@@ -255,4 +264,4 @@ class _Work:
             )
         cost = SolveCost(time.process_time() - began, self.compile_s, evaluations, total)
         self.compile_s = 0.0
-        return out, error, route.method if route.stages else f"{route.method} {order}", cost, events
+        return out, error, self.method, cost, events

@@ -9,7 +9,7 @@ from numba import njit
 
 from toolkit.motion.kernels.pointer import reals, skip, wholes
 from toolkit.motion.kernels.sampling import sample_step
-from toolkit.motion.routes import ROW
+from toolkit.motion.routes import ROW, SPARE
 
 _ROUNDER = 6755399441055744.0  # 1.5·2⁵²: adding it leaves no digits after the point
 _TURN = 6.283185307179586
@@ -36,7 +36,7 @@ def _expand(c: Any, square: float, s: Any) -> None:
 @njit(fastmath={"contract"})
 def _orbit(n: int, points: int, p: Any, t: Any, starts: Any, work: Any, out: Any) -> None:
     period, lost, phase0, direction, turns, over, square = p[0], p[1], p[2], p[3], p[4], p[5], p[6]
-    spare, scratch, rows = work, skip(work, 16), skip(work, 16 + 2 * ROW)
+    spare, scratch, rows = work, skip(work, SPARE), skip(work, SPARE + 2 * ROW)
     for j in range(points + 1):
         c = skip(rows, 2 * j * ROW)
         c[0] = starts[j]
@@ -55,12 +55,12 @@ def _orbit(n: int, points: int, p: Any, t: Any, starts: Any, work: Any, out: Any
         c = skip(rows, 2 * cell * ROW)
         c[0] = starts[cell] + (over * _TURN * (direction * count + more) + turns)
         since = direction * (x - near) * step  # seconds from the cell's middle to this sample
-        i = sample_step(t, i, n, t[i], -since, 0.5001 * step, c, c, 0, _DEGREE, out, 1.0, spare)
+        i = sample_step(t, i, n, t[i], -since, 0.5001 * step, c, c, 0, _DEGREE, out, 1.0, spare, 1e-16)
 
 
 def orbit(places: Any) -> None:
     """places: count, points a period; period (rounded, lost), phase, direction, turns, over the top, ω_g²; increasing
-    times and seven numbers more; θ and θ̇ at the points; memory; θ and θ̇, to be filled."""
+    times; θ and θ̇ at the points; memory; θ and θ̇, to be filled."""
     sizes = wholes(places, 0)
     _orbit(
         sizes[0], sizes[1], reals(places, 1), reals(places, 2), reals(places, 3), reals(places, 4), reals(places, 5)

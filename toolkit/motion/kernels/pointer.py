@@ -54,6 +54,18 @@ def skip(typing: Any, pointer: Any, count: Any) -> Any:
     return pointer(pointer, types.int64), lambda context, builder, _, values: builder.gep(values[0], [values[1]])
 
 
+@intrinsic
+def bits_of(typing: Any, number: Any) -> Any:
+    """The bits of a float64 as an int64."""
+    return types.int64(types.float64), lambda context, builder, _, values: builder.bitcast(values[0], ir.IntType(64))
+
+
+@intrinsic
+def float_of(typing: Any, bits: Any) -> Any:
+    """The float64 that has the bits of an int64."""
+    return types.float64(types.int64), lambda context, builder, _, values: builder.bitcast(values[0], ir.DoubleType())
+
+
 @njit
 def unpack(places: Any) -> Any:
     """The eleven arrays of an integrator, in the order of `routes`."""

@@ -18,11 +18,12 @@ from numba import njit
 
 from toolkit.motion.kernels.events import SLACK, SLIP, STICK, note
 from toolkit.motion.kernels.friction import held_until, leave_rest
-from toolkit.motion.kernels.pointer import call_jet, call_slack, skip, unpack
+from toolkit.motion.kernels.pointer import bits_of, call_jet, call_slack, float_of, skip, unpack
 from toolkit.motion.kernels.sampling import sample_step
 from toolkit.motion.kernels.vector import evaluate_8
 from toolkit.motion.routes import DONE, NOT_FINITE, ROW, SPARE, TOO_MANY_STEPS
 
+_FEW = 8  # terms of F_θ and F_w with which the error is carried along
 _SAFETY = 15.0  # near the separatrix the plain estimate has been up to 13 times too small (benchmarks/integrators.py accuracy)
 
 
@@ -90,26 +91,56 @@ def _turning_point(c: Any, n: int, h: float, sign: float, x: Any) -> tuple[float
     return -1.0, False
 
 
-@njit
+@njit(fastmath={"contract"})
 def _root(w: Any, n: int, left: float, right: float, at_left: float, at_right: float, sign: float) -> float:
-    """The zero of w in a bracket, to the last digit: Newton's steps from the chord, halving where they leave the bracket."""
+    """The zero of w in a bracket, to the last digit: Halley's steps from the chord, halving where they leave the bracket."""
     x = left + (right - left) * at_left / (at_left - at_right)
     for _ in range(100):
-        value, slope = w[n], 0.0
+        value, slope, bend = w[n], 0.0, 0.0
         for k in range(n - 1, -1, -1):
+            bend = bend * x + slope
             slope = slope * x + value
             value = value * x + w[k]
         if sign * value < 0.0:
             right = x
         else:
             left = x
-        near = x - value / slope if slope != 0.0 else right
+        by = slope * slope - value * bend
+        near = x - value * slope / by if by != 0.0 else right
         if not left <= near <= right:
             near = 0.5 * (left + right)
-        if abs(near - x) <= 1e-16 * right:
+        if abs(near - x) <= 1e-7 * right:  # what is left is of the order of the cube
             return near
         x = near
     return x
+
+
+@njit
+def _rough_log2(x: float) -> float:
+    """The logarithm of x > 0 to 0.01: a float's bits, read as a whole number, are nearly that."""
+    bits = bits_of(x)
+    part = float_of(bits & 0x000FFFFFFFFFFFFF | 0x3FF0000000000000) - 1.0
+    return (bits * 2.0**-52 - 1023.0) + 0.345 * part * (1.0 - part)
+
+
+@njit
+def _rough_exp2(y: float) -> float:
+    """2^y, too small by up to 1 %, for y in −1000 … 1000."""
+    part = y - math.floor(y)
+    return float_of(int((y - 0.345 * part * (1.0 - part) + 1022.995) * 2.0**52))
+
+
+@njit
+def _longest(W: Any, n: int, log_tolerance: float, R: Any) -> float:
+    """The step that the last two terms allow; negative where they are not finite."""
+    least = 1000.0
+    for k in range(n - 1, n + 1):
+        last = max(abs(W[k]), abs(W[ROW + k]))
+        if not last < 1e300:
+            return -1.0
+        if last > 0.0:
+            least = min(least, (log_tolerance - _rough_log2(last)) * R[k])
+    return _rough_exp2(least)
 
 
 @njit(fastmath={"contract"})
@@ -148,34 +179,72 @@ def _variational(J: Any, by_theta: int, by_w: int, D: Any, F: Any, n: int, R: An
 
 
 @njit(fastmath={"contract"})
-def _carry(J: Any, by_theta: int, by_w: int, D: Any, n: int, R: Any) -> None:
-    """The same of an error, which nothing forces; in few terms, for which plain loops are quickest."""
+def _carry(J: Any, D: Any, n: int, R: Any) -> None:
+    """The same of an error, which nothing forces, from the first terms of F_θ and F_w: it need not be known to many digits.
+
+    The newest numbers enter last, so that nothing waits for them; the first loop's bounds are known and it is unrolled.
+    """
     K, E = skip(J, ROW), skip(D, ROW)
-    for k in range(n):
-        v = u = 0.0
-        if by_theta != 0:
-            for j in range(k + 1 if by_theta == 2 else 1):
-                v += J[j] * D[k - j]
-        if by_w != 0:
-            for j in range(k + 1 if by_w == 2 else 1):
-                u += K[j] * E[k - j]
+    for k in range(_FEW):
+        v = 0.0
+        for j in range(k, -1, -1):
+            v += J[j] * D[k - j]
+            v += K[j] * E[k - j]
         D[k + 1] = E[k] * R[k + 1]
-        E[k + 1] = (v + u) * R[k + 1]
+        E[k + 1] = v * R[k + 1]
+    for k in range(_FEW, n):
+        v = 0.0
+        for j in range(_FEW - 1, -1, -1):
+            v += J[j] * D[k - j]
+            v += K[j] * E[k - j]
+        D[k + 1] = E[k] * R[k + 1]
+        E[k + 1] = v * R[k + 1]
+
+
+@njit
+def _expand_deviations(
+    W: Any, layout: Any, columns: Any, values: Any, sizes: Any, n: int, h: float, J: Any, F: Any, D: Any, R: Any
+) -> int:
+    """Fill the series of all sensitivities and, after them, of the error; give the order of the error's.
+
+    J : to be filled with F_θ and F_w; where they are constant, their further terms are zero.    F : room for a row.
+    """
+    size = 0.0  # of what carries the error through the step
+    for e in range(layout[2], layout[3]):
+        size += values[e] * W[(3 + columns[1 + e]) * ROW]
+    rough = min(max(5 + int(3.0 * min(h * max(1.0, abs(size)), 8.0)), _FEW), n)
+    k_sens, columns = sizes[6], skip(columns, 1)
+    for a in range(2):
+        _combine(W, columns, values, layout[1 + a], layout[2 + a], n if k_sens > 0 else _FEW, skip(J, a * ROW))
+    for a in range(k_sens):
+        _combine(W, columns, values, layout[4 + a], layout[5 + a], n, F)
+        _variational(J, sizes[1], sizes[2], skip(D, 2 * a * ROW), F, n, R)
+    _carry(J, skip(D, 2 * k_sens * ROW), rough, R)
+    return rough
+
+
+@njit
+def _unavoidable(W: Any, layout: Any, columns: Any, values: Any, now: float) -> float:
+    """What rounding the coefficients and the drive's phase ω τ makes F wrong by, with the same sign at every step."""
+    size = 0.0
+    for e in range(layout[0], layout[1]):
+        size += abs(values[e] * W[(3 + columns[1 + e]) * ROW])
+    for e in range(layout[3], layout[4]):
+        size += abs(values[e] * W[(3 + columns[1 + e]) * ROW] * now)
+    return 1.1e-16 * size
 
 
 def taylor(places: Any) -> None:
     """Fill `out` and `report`: see `routes`; `address` is that of the equation's jet."""
     sizes, q, layout, columns, values, numbers, t, out, report, work, R = unpack(places)
     address = sizes[10]
-    by_theta = sizes[1]
-    by_w = sizes[2]
     switches = sizes[3]
     holds = sizes[4]
     timed = sizes[5]
     k_sens = sizes[6]
     count = sizes[7]
     n = sizes[8]
-    tolerance = numbers[4]
+    log_tolerance = math.log(numbers[4]) / math.log(2.0)
     per_second = numbers[5]
     s = work  # the present time, θ, w and its sign
     lost = skip(work, 4)  # what the last sums of θ and w lost; the first is the fifth number of s
@@ -185,7 +254,6 @@ def taylor(places: Any) -> None:
     D = skip(J, 2 * ROW)  # rows: δθ, δw of each sensitivity, then error of θ, of w
     error = skip(D, 2 * k_sens * ROW)
     W = skip(error, 2 * ROW)
-    w_row = skip(W, ROW)
     for a in range(2 * k_sens):
         D[a * ROW] = numbers[6 + a]
     error[0] = error[ROW] = lost[0] = lost[1] = 0.0
@@ -243,14 +311,8 @@ def taylor(places: Any) -> None:
                 error[ROW] += math.copysign(missing, error[ROW])
                 worst = max(worst, abs(error[0]))
         h = end - hi - lo
-        least = 1e300
-        for k in range(n - 1, n + 1):
-            last = max(abs(W[k]), abs(w_row[k]))
-            if last > 0.0:
-                least = min(least, math.log(tolerance / last) / k)
-        if least < 1e300:
-            h = min(h, math.exp(least))
-        if not (h > 0.0 and h < 1e300):
+        h = min(h, _longest(W, n, log_tolerance, R))
+        if not h > 0.0:
             report[0] = NOT_FINITE
             break
         turned = False
@@ -275,21 +337,8 @@ def taylor(places: Any) -> None:
                 turned = False
         if k_sens > 0:
             call_jet(sizes[11], q, s, W, R, n)
-        size = 0.0  # of what carries the error through the step; the error need not be known to many digits
-        for e in range(layout[2], layout[3]):
-            size += values[e] * W[(3 + columns[1 + e]) * ROW]
-        size = h * max(1.0, abs(size))
-        rough = 5 + int(3.0 * size) if size < 8.0 else n
-        if rough > n:
-            rough = n
-        for a in range(2):  # F_θ, F_w
-            length = (n if k_sens > 0 else rough) if sizes[1 + a] == 2 else 1
-            _combine(W, skip(columns, 1), values, layout[1 + a], layout[2 + a], length, skip(J, a * ROW))
-        for a in range(k_sens):
-            _combine(W, skip(columns, 1), values, layout[4 + a], layout[5 + a], n, F)
-            _variational(J, by_theta, by_w, skip(D, 2 * a * ROW), F, n, R)
-        _carry(J, by_theta, by_w, error, rough, R)
-        i = sample_step(t, i, count, hi, lo, h, W, D, k_sens, n, out, per_second, x)
+        rough = _expand_deviations(W, layout, columns, values, sizes, n, h, J, F, D, R)
+        i = sample_step(t, i, count, hi, lo, h, W, D, k_sens, n, out, per_second, x, max(0.1 * numbers[4], 1e-16))
         # the next state, with what the last sums lost
         change = h + lo
         new = hi + change
@@ -300,13 +349,10 @@ def taylor(places: Any) -> None:
         power = 0.3 * _SAFETY * _power(h, n - 1)
         change_theta, change_w, slope = _ahead(W, n, h)
         seed = (seed * 1103515245 + 12345) % 2147483648
-        rounding = 2.2e-16 if seed < 1073741824 else -2.2e-16  # rounding errors add like a random walk, but …
-        always = 0.0  # … those of the coefficients and of the drive's phase ω τ have the same sign at every step
-        for e in range(layout[0], layout[1]):
-            always += 1.1e-16 * abs(values[e] * W[(3 + columns[1 + e]) * ROW])
-        for e in range(layout[3], layout[4]):
-            always += 1.1e-16 * abs(values[e] * W[(3 + columns[1 + e]) * ROW] * s[0])
-        error[ROW] += math.copysign(h * always, error[ROW])
+        rounding = (
+            2.2e-16 if seed < 1073741824 else -2.2e-16
+        )  # rounding errors add like a random walk, but not all of them
+        error[ROW] += math.copysign(h * _unavoidable(W, layout, columns, values, s[0]), error[ROW])
         for a in range(2):
             series = skip(W, a * ROW)
             change = h * (change_theta if a == 0 else change_w) + lost[a]
