@@ -29,6 +29,23 @@ def test_quick_and_slow_errors_of_a_localiser_both_count():
     assert found.shake_px == 0
 
 
+def test_what_a_fit_has_taken_from_errors_that_neighbours_share_is_put_back():
+    rng = np.random.default_rng(6)
+    waves = [f(k * 5 * T) * T**n for k in (1, 2) for f in (np.cos, np.sin) for n in (0, 1)]
+    motion = np.stack([np.ones(N), *waves], axis=1)
+    for alike, tolerance in ((0.0, 0.03), (0.8, 0.05)):
+        ratios = []
+        for _ in range(40):
+            errors = rng.normal(0, 0.03 * np.sqrt(1 - alike**2), (2, N + 50))
+            for k in range(1, N + 50):
+                errors[:, k] += alike * errors[:, k - 1]
+            errors = errors[:, 50:]
+            left = errors - (motion @ np.linalg.lstsq(motion, errors.T, rcond=None)[0]).T
+            found = factors(*left, unsteady=0.005)  # the camera stood still
+            ratios += [found.x / (np.std(errors[0]) / 0.02), found.y / (np.std(errors[1]) / 0.02)]
+        assert np.mean(ratios) == pytest.approx(1.0, abs=tolerance)
+
+
 def test_a_shaking_camera_is_told_from_the_localiser_by_what_is_across_the_motion():
     rng = np.random.default_rng(1)
     quick = rng.normal(0, 0.03, (2, N))

@@ -84,3 +84,38 @@ def test_a_bob_with_a_shadow_that_it_overlaps_is_tracked_to_a_tenth_of_a_pixel(t
     off = np.hypot(np.mean(found.x_px - x), np.mean(found.y_px - y))
     assert off < 0.1  # a disc alone lies 3 px towards the shadow
     assert found.radius_px == pytest.approx(12.0, abs=0.2)
+
+
+def patterned(x, y, turned, wall, shadow, rng):
+    """A bob with a dark half and one as bright as the wall, and its shadow."""
+    right, down, radius, soft, strength = shadow
+    rows, columns = np.mgrid[0 : wall.shape[0], 0 : wall.shape[1]]
+    half = np.tanh(3 * ((columns - x) * np.cos(turned) + (rows - y) * np.sin(turned)))
+    bob = covered(x, y, 12.0, 0.7, wall.shape)
+    shaded = wall * (1 - strength * covered(x + right, y + down, radius, soft, wall.shape))
+    return shaded * (1 - bob) + (120.0 + 42.0 * half) * bob + rng.normal(0, 1.5, wall.shape)
+
+
+def test_a_shadow_is_not_followed_in_place_of_a_bob_with_a_pattern(tmp_path):
+    rng = np.random.default_rng(3)
+    t_s = np.arange(120) / 60
+    theta = angles(t_s)
+    x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
+    wall = np.full((H, W), 165.0)
+    shadow = (-16.0, 18.0, 12.0, 2.2, 0.42)
+    frames = [patterned(a, b, 5 * t, wall, shadow, rng) for a, b, t in zip(x, y, t_s)]
+    found = track(film(tmp_path / "pattern.mp4", [np.clip(f, 0, 255).astype(np.uint8) for f in frames]))
+    assert (found.status == OK).mean() > 0.95
+    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 1.0  # the shadow is 24 px away
+
+
+def test_the_bob_is_found_beside_the_shadow_that_was_taken_for_it():
+    shadow = (-14.0, 17.0, 12.0, 2.5, 0.4)
+    found = find_shadow(seen(shadow, shadow[:2]), Look(12.0, 2.5, -60.0, 3.0))
+    assert found is not None
+    assert found.taken_for_bob
+    assert np.hypot(found.x_px + shadow[0], found.y_px + shadow[1]) < 0.2
+    assert found.contrast == pytest.approx(70 - 181, abs=8)
+    beside = find_shadow(seen(shadow), Look(12.0, 0.7, -100.0, 3.0))
+    assert beside is not None
+    assert not beside.taken_for_bob

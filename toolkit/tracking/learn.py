@@ -15,7 +15,7 @@ from toolkit.tracking.front import EVEN, Rhythm, find_front, fit_each, is_clear,
 from toolkit.tracking.looks import Looks, Sightings, learn_looks
 from toolkit.tracking.search import still_picture
 from toolkit.tracking.shadow import Shaded, Shadow, find_shadow
-from toolkit.tracking.sight import LUMA
+from toolkit.tracking.sight import LUMA, Sight
 from toolkit.tracking.stillness import STILL, Anchors, CameraShift
 from toolkit.tracking.swing import CALM, Swing, fit_swing
 from toolkit.tracking.trail import Rough, cut
@@ -24,6 +24,7 @@ from toolkit.video import Frame
 _CHECK_EVERY = 12
 _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
+_LESS = 0.8  # of the misfit: by so much a bob with a pattern is explained better with a shadow
 
 
 class Trial(NamedTuple):
@@ -201,23 +202,25 @@ class Known:
         """The looks, and its shadow; the points without what the shadow drew them by."""
         alone = self._learn_looks(batch, look, points, radius)
         shaded = self._learn_shadow(batch, alone.look, points)
-        if shaded is None:
+        if shaded is None or not (shaded.taken_for_bob or self.sight.weights == LUMA):
             return alone, points
-        self.shadow = shaded.shadow
+        sight, self.sight, self.shadow = self.sight, Sight(LUMA), shaded.shadow
         without = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
-        bare = alone.look._replace(radius_px=radius or shaded.radius_px, edge_px=shaded.edge_px, even=True)
+        bare = Look(radius or shaded.radius_px, shaded.edge_px, shaded.contrast, alone.look.noise)
         self._learn_background(batch, bare, without)
         looks = self._learn_looks(batch, bare, without, radius)
-        if alone.look.even or looks.look.even:
+        if shaded.taken_for_bob or alone.look.even or looks.look.even or looks.look.noise < _LESS * alone.look.noise:
             return looks, without
-        self.shadow = None  # a bob with a pattern, but no shadow
+        self.sight, self.shadow = sight, None  # a bob with a pattern, but no shadow
         self._learn_background(batch, look, points)
         return alone, points
 
     def _learn_shadow(self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]]) -> Shaded | None:
         """The shadow beside a bob of about this look, from the frames on which it is slow."""
-        if self.sight.weights != LUMA:
-            return None
+        sight, self.sight = self.sight, Sight(LUMA)  # in a colour difference a shadow hardly shows
+        if sight != self.sight:
+            look = look._replace(contrast=0.0, noise=np.inf)
+            self._learn_background(batch, look, points)
         numbers = np.array(list(points))
         speed = np.hypot(*self.swing.velocity(np.array([batch[i].t_s for i in numbers])))
         slow = numbers[np.argsort(speed)[: max(10, numbers.size // 3)]]
@@ -228,6 +231,9 @@ class Known:
             patch = self._patch(batch[i], look, guess, half)
             if patch is not None:
                 seen.append((patch, guess))
+        if sight != self.sight:
+            self.sight = sight
+            self._learn_background(batch, look, points)
         return find_shadow(seen, look)
 
     def _learn_looks(
@@ -263,7 +269,8 @@ class Known:
             return load_tracker(names[0])
         if len(names) > 1:
             self.choice = _told_choice(tried, abs(self.look.contrast))
-        calm = 2.0 * min(t.swing.rms_px for t in tried) + 0.05  # whatever it explains, what leaps about was not found
+        # whatever it explains, what leaps about was not found; what errs alike on all frames does not leap
+        calm = 2.0 * min(t.swing.rms_px for t in tried) + max(0.05, 0.01 * self.look.radius_px)
         # a model with more freedom leaves less of any picture
         best = min(
             (t for t in tried if t.swing.rms_px < calm and not any(other.finds_more_than(t) for other in tried)),

@@ -9,7 +9,8 @@ import numpy as np
 _FITS = 2.5  # a motion fits where places stray from it by less than so many times their scatter from frame to frame
 _CLOCK = 3.0  # by how much a localiser may be worse along the motion than across it
 _SLOW = 0.35  # of the greatest speed: below it a clock that errs hardly moves the bob
-_FREE = 9  # what a fitted motion has taken from the residuals of each axis
+_FREE = 9  # so many values a fitted motion has taken from the residuals of each axis,
+_LEFT = 0.85  # but of their mean square it has left so much
 _LEAST, _USUAL, _MOST = 0.5, 4.0, 10.0  # what a fit's own σ is multiplied by; beyond the last the quick is not its own
 
 
@@ -42,6 +43,8 @@ def true_sigma(
     (rx, ry), (sx, sy), (vx, vy) = residuals, sigmas, velocity
     speed = np.hypot(vx, vy) + 1e-9
     ux, uy = vx / speed, vy / speed
+    v = max(vx, vy, key=np.std)
+    step_rad = float(np.std(np.diff(v)) / np.std(v))  # of the swing's period, from one frame to the next
     across = rx * uy - ry * ux, np.hypot(sx * uy, sy * ux)
     along = rx * ux + ry * uy, np.hypot(sx * ux, sy * uy)
     still = unsteady_px < 0.5 * float(np.sqrt(np.mean(rx**2 + ry**2)))
@@ -54,7 +57,7 @@ def true_sigma(
         known = float(np.mean((np.hypot(late, shake_px) / s) ** 2))
         r = _tamed(r / s) * s  # a few pictures may be of another time
         quick = _less(quick_scatter(t_s, r, s) ** 2, known)
-        whole = float(np.mean((r / s) ** 2)) * r.size / max(r.size - _FREE, 1) - known
+        whole = float(np.mean((r / s) ** 2)) / _left(r / s, step_rad) - known
         fits.append(whole <= _FITS**2 * quick)
         if rough or np.any(shake_px) or not (fits[-1] or (still and timely)):
             found.append(quick if quick < _MOST**2 else np.nan)
@@ -74,6 +77,22 @@ def true_sigma(
 def _less(square: float, known: float) -> float:
     """The square without what is known of it; NaN where that is nearly all, so that nothing can be told of the rest."""
     return square - known if square - known > 0.3 * square else np.nan
+
+
+def _left(r: np.ndarray, step_rad: float) -> float:
+    """What share of its mean square a fitted motion has left of a series (n,) of which a frame is `step_rad` of a period: it
+    took `_FREE` of the values that are independent of their neighbours, of what changes within a period."""
+    half = min(int(np.pi / max(step_rad, 1e-3)), r.size - 1)
+    slow = np.convolve(np.pad(r, half, "reflect"), np.full(2 * half + 1, 1 / (2 * half + 1)), "valid")
+    within, length = r - slow, 1.0
+    for k in range(1, half):
+        alike = float(within[k:] @ within[:-k]) / max(float(within @ within), 1e-300)
+        if alike <= 0:
+            break
+        length += 2 * alike
+    taken = _FREE / r.size
+    alike = length * float(within @ within) / max(float(r @ r), 1e-300)
+    return max(1 - taken * alike, min(_LEFT, 1 - taken), 1 / r.size)
 
 
 def _tamed(r: np.ndarray) -> np.ndarray:

@@ -13,6 +13,9 @@ from toolkit.tracking.least_squares import least_squares
 
 _PIXELS = 3000  # so many are compared with the model
 _CLEAR = 8.0  # grey levels: what the model leaves counts less where it is more
+_ALIKE = 1.1  # so much worse a model may be, and as likely
+_OWN = 6.0  # grey levels: what is explained less well may be the bob
+_SHADOWY_PX = 1.2  # a sharper edge is no shadow's
 _DARK = 0.04  # share of light that is missed beside the bob wherever a shadow is looked for
 
 
@@ -52,22 +55,36 @@ class Shadow(NamedTuple):
 
 
 class Shaded(NamedTuple):
-    """A shadow, and what the bob is without it: its centre less where it was taken to be, its radius and edge, px."""
+    """A shadow, and what the bob is without it: its centre less where it was taken to be, its radius and edge, px, and its
+    contrast, grey levels."""
 
     shadow: Shadow
     x_px: float
     y_px: float
     radius_px: float
     edge_px: float
+    contrast: float
+
+    @property
+    def taken_for_bob(self) -> bool:
+        """Was the bob taken to be where its shadow is?"""
+        to_shadow = np.hypot(self.x_px + self.shadow.right_px, self.y_px + self.shadow.down_px)
+        return bool(to_shadow < 0.3 * self.radius_px < 0.6 * np.hypot(self.x_px, self.y_px))
 
 
 def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
-    """The shadow beside an even bob, by a disc and a soft darker disc behind it that are fitted to patches on which the bob is
-    slow (each with the guess at its centre). None where the bob alone explains them nearly as well."""
+    """The shadow beside the bob, by what is fitted to patches on which the bob is slow (each with the guess at its centre).
+    None where the bob alone explains them nearly as well."""
     u, v, image, back, beside = _pixels(seen, look)
     unlike = look.noise > 0.02 * abs(look.contrast) + 2.5  # a shadow that overlaps the bob is fitted as a part of it
     if u.size < 200 or not (unlike or _light_is_missed(u, v, image, back, beside, look)):
         return None
+    found = _beside_even(u, v, image, back, look)
+    return found or (_beside_patterned(u, v, image, back, look) if look.even else None)
+
+
+def _beside_even(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, look: Look) -> Shaded | None:
+    """By a disc and a soft darker disc behind it."""
     contrast = look.contrast or float(np.median(image) - np.median(back))
     size = look.radius_px
     alone = np.array([0, 0, size, look.edge_px, np.median(back) + contrast, 0, 0, 1.0, 0, size, 0, size, 3.0])
@@ -91,23 +108,69 @@ def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
             start[:2] = -0.2 * right, -0.2 * down  # the bob alone was drawn towards its shadow
             start[8:11] = right, down, 0.3
             starts.append(fit(start, range(13), 4, 4))
+    start = alone.copy()
+    start[8:11] = *_rest_beside(u, v, image, back, size), 0.3
+    starts += [fit(s, range(13), 4, 4) for s in (start, _exchanged(start))]
     starts.sort(key=lambda s: s[1])
     values, with_it = min((fit(start, range(13), 1, 15) for start, _ in starts[:2]), key=lambda s: s[1])
-    if values[12] < values[3]:  # the bob has the sharper edge in most pictures: they may have been taken for each other
-        values, with_it = min((values, with_it), fit(_exchanged(values), range(13), 1, 15), key=lambda s: s[1])
-    cx, cy, radius, edge = (float(a) for a in values[:4])
-    shadow = Shadow(*(float(values[k]) for k in (8, 9, 11, 12, 10)))
+    if abs(values[12]) < abs(values[3]):  # the bob has the sharper edge: they may have been taken for each other
+        other = fit(_exchanged(values), range(13), 1, 15)
+        if other[1] < _ALIKE * with_it:
+            values, with_it = other
+    cx, cy, radius, edge, shade, _, _, gain, right, down, strength, shadow_px, soft = (float(a) for a in values)
+    shadow = Shadow(right, down, shadow_px, abs(soft), strength)
     far = float(np.hypot(shadow.right_px, shadow.down_px))
     plausible = (
         0.03 < shadow.strength < 0.95
         and 0.6 < shadow.radius_px / radius < 1.6
         and 0.6 < radius / size < 1.3
-        and shadow.soft_px > 0.3
+        and shadow.soft_px > max(0.3, 0.6 * abs(edge))
         and radius + 1 < far + shadow.radius_px < 6 * radius
+        and far
+        > (0.25 if look.even else 0.5) * radius  # a pattern may look a little like a shadow behind most of the bob
     )
-    if not plausible or with_it > (0.75 if look.even else 0.5) * without:  # a pattern may look a little like a shadow
+    if not plausible or with_it > (0.75 if look.even else 0.7) * without:
         return None
-    return Shaded(shadow, cx, cy, radius, max(0.35, edge))
+    return Shaded(shadow, cx, cy, radius, max(0.35, abs(edge)), shade - gain * float(np.median(back)))
+
+
+def _beside_patterned(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, look: Look) -> Shaded | None:
+    """The shadow was taken for the bob, which is beside it and may look like anything: by a soft darker disc, and another in
+    which nothing is explained, so small as may be."""
+    size = look.radius_px
+    start = np.array([*_rest_beside(u, v, image, back, size), size, 1.0, 0, 0, 0.3, size, max(look.edge_px, 1.0)])
+    steps = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3])
+
+    def parts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        cx, cy, radius, gain, sx, sy, strength, shadow_px, soft = values
+        bob = _covered(np.hypot(u - cx, v - cy), radius, 0.7)
+        wall = gain * back * (1 - strength * _covered(np.hypot(u - sx, v - sy), shadow_px, soft))
+        return bob, _CLEAR * np.arcsinh((image - wall) / _CLEAR)
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        bob, off = parts(values)
+        return np.concatenate([(1 - bob) * off, _OWN * np.sqrt(bob)])
+
+    least = least_squares(rest, start, steps, range(9), turns=15)
+    if least is None:
+        return None
+    cx, cy, radius, gain, sx, sy, strength, shadow_px, soft = (float(a) for a in least.values)
+    bob, off = parts(least.values)
+    beyond, within = off[bob < 0.5], off[bob > 0.5]
+    found = (
+        within.size > 50
+        and np.sqrt(np.mean(beyond**2)) < min(0.5 * _OWN, 0.25 * np.sqrt(np.mean(within**2)))
+        and np.hypot(sx, sy) < 0.3 * size
+        and abs(soft) > _SHADOWY_PX
+        and 0.05 < strength < 0.95
+        and 0.6 < shadow_px / radius < 1.6
+        and np.hypot(cx - sx, cy - sy) > 0.5 * radius
+    )
+    if not found:
+        return None
+    away = (image - gain * back)[bob > 0.5]
+    contrast = float(np.mean(away[np.abs(away) >= np.median(np.abs(away))]))
+    return Shaded(Shadow(sx - cx, sy - cy, shadow_px, abs(soft), strength), cx, cy, radius, 0.7, contrast)
 
 
 def _pixels(
@@ -132,6 +195,12 @@ def _pixels(
         taken.append(np.array([u, v, *(picture[rows, columns] for picture in (patch.image, patch.back, patch.seen))]))
     u, v, image, back, times = np.concatenate(taken, axis=1)
     return u, v, image, back, times > 0
+
+
+def _rest_beside(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, size: float) -> tuple[float, float]:
+    """The middle of what differs from the background and is not the bob."""
+    differs = np.maximum(np.abs(image - back) - _CLEAR, 1e-6) * (np.hypot(u, v) > 1.2 * size)
+    return float(np.average(u, weights=differs)), float(np.average(v, weights=differs))
 
 
 def _light_is_missed(
@@ -166,5 +235,5 @@ def _exchanged(values: np.ndarray) -> np.ndarray:
 def _covered(distance: np.ndarray, radius: float, edge: float) -> np.ndarray:
     from scipy.special import ndtr
 
-    covered: np.ndarray = ndtr((radius - distance) / max(edge, 0.2))
+    covered: np.ndarray = ndtr((radius - distance) / np.hypot(edge, 0.2))
     return covered
