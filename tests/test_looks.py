@@ -54,6 +54,25 @@ def test_the_exposure_is_told_by_the_streak(exposure_s, lag):
     assert found.look.even
 
 
+def test_a_size_that_grows_is_learned_though_the_bob_turns_beyond_the_rim():
+    """Nearer to the camera on the right, where its slowest frames show only a part of it."""
+    speed = np.abs(np.linspace(-1, 1, 40)) ** 0.5 * -300 + 300  # slow at both ends
+    x = np.linspace(20, 158, 40)
+    speed[x < 80] *= 0.3
+    size = 11.0 + 0.02 * x
+    rows, columns = np.mgrid[0:100, 0:160]
+    rng = np.random.default_rng(6)
+    bobs = [ndtr((r - np.hypot(columns - a, rows - 50)) / EDGE) for a, r in zip(x, size)]
+    pictures = [(180 - 110 * bob + rng.normal(0, 1.5, bob.shape)).astype(np.float32) for bob in bobs]
+    wall, often = np.full((100, 160), 180, np.float32), np.full((100, 160), 9, np.float32)
+    seen = Sightings(
+        x, 50 + 0 * x, 0 * x, speed, lambda k, *_: (Guess(x[k], 50.0), Patch(pictures[k], wall, often, 0, 0))
+    )
+    found = learn_looks(seen, Look(12.0, 1.0, -105.0, 8.0), None, 1e-4, (100, 160))
+    assert found.look.radius_free
+    assert found.growth[0] == pytest.approx(0.02, abs=0.003)
+
+
 def test_what_a_rolling_shutter_shears_is_not_hidden():
     speed = np.linspace(0, 1000, 100)
     (slow, fast), (least_slow, least_fast) = _by_speed(speed, np.where(speed > 700, 0.8, 1.0))

@@ -28,9 +28,11 @@ def angles(t, amplitude=0.3):
     return solve_ivp(motion, (0, t[-1] + 1), [amplitude, 0.0], t_eval=t, rtol=1e-9, atol=1e-10).y[0]
 
 
-def draw(x, y, rng, pivot=PIVOT, string=True, post=None):
-    """One frame: wall, string, bob as an exact anti-aliased disc, then noise."""
+def draw(x, y, rng, pivot=PIVOT, string=True, post=None, board=None):
+    """One frame: wall and board, string, bob as an exact anti-aliased disc, post, then noise."""
     big = np.full((H, W), 190.0)
+    if board:
+        big[:, board[0] : board[1]] = 100.0
     if string:
         cv2.line(
             big, tuple(round(16 * v) for v in (x, y)), tuple(round(16 * v) for v in pivot), 110.0, 1, cv2.LINE_AA, 4
@@ -115,6 +117,16 @@ def test_a_post_hides_the_bob_for_a_while(tmp_path):
     assert all(found.ok[k : k + 2].any() for k in back)  # seen again within two frames of being wholly clear
     assert np.abs((found.x_px - x)[found.status == OK]).max() < 0.6
     assert np.nanmax(np.abs((found.x_px - x)[found.status == PREDICTED])) < 1.0
+
+
+def test_a_bob_before_a_board_that_is_not_much_brighter(tmp_path):
+    _, _, x, y = swing_clip(tmp_path / "board.mp4", board=(150, 210))
+    found = track(tmp_path / "board.mp4")
+    before = (x > 150 + RADIUS) & (x < 210 - RADIUS)
+    assert before.mean() > 0.1
+    assert found.ok[before].mean() > 0.97
+    assert found.ok.mean() > 0.95
+    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
 
 
 @pytest.mark.parametrize("kind", ["still", "noise", "passing", "short", "one"])
