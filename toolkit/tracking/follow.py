@@ -265,7 +265,7 @@ class Follower(Known):
         if not self.look.even:
             self._unlike_seen = self._unlike(patch, place)
             return not self._unlike_seen < 0.65 * self._usually_unlike
-        shade, radius = self._shade, self.look.radius_px
+        shade, radius = self._shade, self.look_at(Guess(place.x_px, place.y_px)).radius_px
         if isnan(shade) or not isfinite(place.wall):
             return True
         still = patch._replace(back=self.back.mean, x_px=0.0, y_px=0.0)  # without the bob's own shadow
