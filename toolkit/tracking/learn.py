@@ -209,9 +209,10 @@ class Known:
         bare = Look(radius or shaded.radius_px, shaded.edge_px, shaded.contrast, alone.look.noise)
         self._learn_background(batch, bare, without)
         looks = self._learn_looks(batch, bare, without, radius)
-        if shaded.taken_for_bob or alone.look.even or looks.look.even or looks.look.noise < _LESS * alone.look.noise:
+        less = 1.0 if alone.look.even or looks.look.even else _LESS
+        if shaded.taken_for_bob or looks.look.noise < less * alone.look.noise:
             return looks, without
-        self.sight, self.shadow = sight, None  # a bob with a pattern, but no shadow
+        self.sight, self.shadow = sight, None  # a bob with a pattern, or drawn out by the lens, but no shadow
         self._learn_background(batch, look, points)
         return alone, points
 
