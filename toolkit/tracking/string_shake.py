@@ -15,6 +15,7 @@ from toolkit.tracking.view_fit import Lines
 _MOST_SEEN = 0.7  # of the measured frames: a string seen on fewer tells too little
 _LEAST_PX = 0.3  # less is no shake worth a string's noise
 _OUT_OF_STEP = 0.3  # of what moves the pivot: where less is out of step with the swing, it is the view
+_BESIDE_PX = 1.5  # what passes the bob farther off than usual is not its string
 _STRAY = 5.0  # robust standard deviations: a line so far off is a post's or a passer-by's
 
 
@@ -37,6 +38,7 @@ def shake_on_string(places: Places, lines: Lines) -> tuple[np.ndarray, np.ndarra
         off = np.column_stack([passes, pivot])
         off -= np.median(off[used], axis=0)
         spread = _STRAY * 1.4826 * np.median(np.abs(off[used]), axis=0) + _LEAST_PX
+        spread[0] = min(spread[0], _BESIDE_PX)
         before, used = used, measured & np.all(np.abs(off) < spread, axis=1)
         if np.array_equal(before, used):
             break
