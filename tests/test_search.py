@@ -7,7 +7,13 @@ import pytest
 from test_track import LENGTH, PIVOT, RADIUS, H, W, angles, film
 
 from toolkit.track import OK, track
+from toolkit.trackers.localiser import Look
+from toolkit.tracking.acquire import _is_shadow_of
 from toolkit.tracking.search import find_round_movers, find_round_near, silhouette, still_picture
+from toolkit.tracking.sight import Sight, best_sight
+from toolkit.tracking.swing import fit_swing, start_swing
+from toolkit.tracking.trail import Rough
+from toolkit.video import Frame
 
 pytest.importorskip("av")
 cv2 = pytest.importorskip("cv2")
@@ -95,3 +101,33 @@ def test_a_wall_full_of_things_is_no_wall_of_one_level(tmp_path):
     found = track(film(tmp_path / "clutter.mp4", frames))
     assert (found.status == OK).mean() > 0.8
     assert np.median(np.hypot(found.x_px - x, found.y_px - y)[found.ok]) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("off", "look", "shadows"),
+    [
+        ((-24, 22), Look(11.0, 3.5, -49.0, 1.2), True),
+        ((-24, 22), Look(11.0, 0.5, -90.0, 1.2), False),  # as clear as the other
+        ((4, 2), Look(5.0, 3.5, -49.0, 1.2), False),  # a part of it
+        (None, Look(11.0, 3.5, -49.0, 1.2), False),  # on a way of its own
+    ],
+)
+def test_what_goes_beside_another_fainter_and_softer_is_its_shadow(off, look, shadows):
+    t = np.arange(60) / 30
+    x, y = 200 + 100 * np.sin(4 * t), 300 - 20 * np.sin(4 * t) ** 2
+    u, v = (x + off[0], y + off[1]) if off else (100 + 50 * t, 100 + 0 * t)
+    swing = fit_swing(t, x, y, np.full(60, 0.3), start_swing(t, x, y))
+    bob = Rough(Look(11.0, 0.6, -96.0, 7.7), swing, dict(enumerate(zip(x, y))), 40.0, Sight())
+    other = Rough(look, swing, dict(enumerate(zip(u, v))), 70.0, Sight())
+    assert _is_shadow_of(other, bob) is shadows
+    assert not _is_shadow_of(bob, other)
+
+
+def test_a_post_beside_the_bob_does_not_make_its_brightness_useless():
+    wall = np.full((60, 120), 190.0)
+    wall[:, 68:71] = 60.0
+    bob = disc(52, 30, 9, wall.shape)
+    luma = (wall * (1 - bob) + 140 * bob).astype(np.uint8)
+    tint = (bob[::2, ::2] > 0.5).astype(np.uint8)
+    frame = Frame(0, 0.0, luma, lambda kind: (128 - 5 * tint, 128 + 5 * tint))
+    assert best_sight([frame], [(52.0, 30.0)], 9.0).name == "brightness"

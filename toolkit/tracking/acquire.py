@@ -25,6 +25,7 @@ from toolkit.video import Frame
 
 _FOLLOWED = 8  # hypotheses at most
 _MOST = 0.9  # of the frames: a bob seen on fewer is looked for in other ways too
+_SHADOWED = 0.3  # of its shadow's score a bob has at least
 REMEDY = "give --bob X,Y (its centre in px on the first frame)"
 
 
@@ -68,7 +69,7 @@ def _likeliest(
     stage: Stage | None = None,
 ) -> Rough | None:
     """The hypothesis that, followed, swings best. What was followed once is not followed again."""
-    best: Rough | None = None
+    roughs: list[Rough] = []
     trails: list[Trail] = []
     for sight, h in candidates:
         start = samples[h.sample]
@@ -81,9 +82,21 @@ def _likeliest(
             continue
         trails.append(trail)
         rough = trail.follow(radius)
-        if rough is not None and (best is None or rough.score > best.score):
-            best = rough
-    return best
+        if rough is not None:
+            roughs.append(rough)
+    best = max(roughs, key=lambda rough: rough.score, default=None)
+    return best and next((rough for rough in roughs if _is_shadow_of(best, rough)), best)
+
+
+def _is_shadow_of(one: Rough, other: Rough) -> bool:
+    """Does it go with the other, beside it, fainter and softer?"""
+    common = sorted(one.points.keys() & other.points.keys())
+    if len(common) < 0.7 * len(one.points) or not other.score > _SHADOWED * one.score:
+        return False
+    off = np.array([np.subtract(one.points[i], other.points[i]) for i in common])
+    beside = np.hypot(*off.mean(axis=0)) > max(one.look.radius_px, other.look.radius_px)
+    fainter = abs(one.look.contrast) < 0.8 * abs(other.look.contrast) and one.look.edge_px > other.look.edge_px
+    return bool(beside and fainter and np.hypot(*off.std(axis=0)) < 0.2 * other.look.radius_px)
 
 
 def _weight(batch: list[Frame], rough: Rough, still: np.ndarray) -> float:

@@ -97,7 +97,8 @@ def best_sight(frames: list[Frame], places: list[tuple[float, float]], radius_px
     a, b = np.concatenate(inside).astype(float), np.concatenate(outside).astype(float)
     difference = np.median(a, axis=0) - np.median(b, axis=0)
     noise = np.cov(b.T) + 0.5 * np.eye(3)
-    by_luma = abs(difference[0]) / np.sqrt(noise[0, 0])
+    low, high = np.percentile(b[:, 0], [16, 84])
+    by_luma = abs(difference[0]) / min(np.sqrt(noise[0, 0]), 0.5 * (high - low) + 0.7)  # a post beside it is no noise
     mix = np.linalg.solve(noise, difference)
     by_mix = float(np.sqrt(difference @ mix))
     # a wall's texture counts as noise here, but is learned later: where brightness differs much, it will do
