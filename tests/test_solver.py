@@ -64,19 +64,6 @@ def test_the_number_of_samples_changes_no_digit(count):
         np.testing.assert_array_equal(one[-1], other[-1])
 
 
-@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9, 1e-11])
-def test_dense_samples_are_those_of_sparse_ones(accuracy):
-    """Where a step holds many samples they are read off short series: together with few, they differ by next to nothing."""
-    for t in (np.linspace(0, 4, 20_001), np.unique(np.r_[np.geomspace(1e-4, 4, 6000), np.linspace(1, 1.1, 4000), 4.0])):
-        every = np.unique(np.r_[np.arange(0, t.size, 61), t.size - 1])
-        dense, sparse = EQUATION.solve(P, 1.0, 0.3, t, accuracy), EQUATION.solve(P, 1.0, 0.3, t[every], accuracy)
-        assert dense.cost.steps == sparse.cost.steps
-        np.testing.assert_allclose(dense.theta_rad[every], sparse.theta_rad, rtol=0, atol=max(1e-3 * accuracy, 2e-15))
-        np.testing.assert_allclose(
-            dense.omega_rad_per_s[every], sparse.omega_rad_per_s, rtol=0, atol=max(1e-2 * accuracy, 2e-14)
-        )
-
-
 def test_threads_do_not_share_memory():
     alone = {a: EQUATION.solve(P, a, 0.0, T, 1e-10).theta_rad for a in (0.5, 1.5)}
     wrong = []

@@ -29,7 +29,7 @@ import numpy as np
 
 ROW = 32  # Taylor coefficients kept of each basis function
 MIN_ORDER, MAX_ORDER = 8, ROW - 2
-SPARE = 136  # numbers of memory for sampling
+SPARE = 24  # numbers of memory for sampling
 MOST_EVENTS = 64
 DONE, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2
 

@@ -55,7 +55,7 @@ def _orbit(n: int, points: int, p: Any, t: Any, starts: Any, work: Any, out: Any
         c = skip(rows, 2 * cell * ROW)
         c[0] = starts[cell] + (over * _TURN * (direction * count + more) + turns)
         since = direction * (x - near) * step  # seconds from the cell's middle to this sample
-        i = sample_step(t, i, n, t[i], -since, 0.5001 * step, c, c, 0, _DEGREE, out, 1.0, spare, 1e-16)
+        i = sample_step(t, i, n, t[i], -since, 0.5001 * step, c, c, 0, _DEGREE, out, 1.0, spare)
 
 
 def orbit(places: Any) -> None:

@@ -118,7 +118,7 @@ def rodas(places: Any) -> None:
             k31 += H3_[j] * U[2 * j + 1]
         _cubic(P, theta, x, k20, k30, 1.0 / h)
         _cubic(V, w, y, k21, k31, 1.0 / h)
-        i = sample_step(t, i, count, now, 0.0, h, P, P, 0, 3, out, numbers[5], room, 1e-16)
+        i = sample_step(t, i, count, now, 0.0, h, P, P, 0, 3, out, numbers[5], room)
         # the embedded method, of order 3, errs by `lower`; the method itself by that times about h, for which the share
         # of the error in the change over the step stands; the interpolant, between the ends, by about `lower` once
         lower = abs(U[10])

@@ -330,7 +330,7 @@ def taylor(places: Any) -> None:
         if k_sens > 0:
             call_jet(sizes[11], q, s, W, R, n)
         rough = _expand_deviations(W, layout, columns, values, sizes, n, h, J, F, D, R)
-        i = sample_step(t, i, count, hi, lo, h, W, D, k_sens, n, out, per_second, x, max(0.1 * numbers[4], 1e-16))
+        i = sample_step(t, i, count, hi, lo, h, W, D, k_sens, n, out, per_second, x)
         # the next state, with what the last sums lost
         change = h + lo
         new = hi + change

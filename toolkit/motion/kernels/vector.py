@@ -49,15 +49,12 @@ def _intrinsic(builder: Any, name: str, result: Any, arguments: list[Any]) -> An
     return cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{WIDTH}f64")
 
 
-def _polynomials(groups: int, stride: int = 1, rows_apart: int = ROW) -> Any:
-    """Two series at 4·groups times less start and lost: out[j], and factor times the second at out[apart + j].
-
-    A coefficient lies `stride` numbers after the one before, the second series `rows_apart` after the first.
-    """
+def _polynomials(groups: int) -> Any:
+    """Two series that lie a row apart, at 4·groups times less start and lost: out[j], and factor times the second at out[stride + j]."""
 
     @intrinsic
     def evaluate(
-        typing: Any, series: Any, degree: Any, times: Any, start: Any, lost: Any, out: Any, apart: Any, factor: Any
+        typing: Any, series: Any, degree: Any, times: Any, start: Any, lost: Any, out: Any, stride: Any, factor: Any
     ) -> Any:
         def emit(context: Any, builder: Any, _: Any, values: Any) -> Any:
             c, n, t, begin, little, to, apart, by = values
@@ -65,21 +62,17 @@ def _polynomials(groups: int, stride: int = 1, rows_apart: int = ROW) -> Any:
             offsets = [ir.Constant(whole, WIDTH * g) for g in range(groups)]
             begin, little, by = (_all(builder, v) for v in (begin, little, by))
             xs = [builder.fsub(builder.fsub(_load(builder, t, o), begin), little) for o in offsets]
-            rows = [c, builder.gep(c, [ir.Constant(whole, rows_apart)])]
-
-            def coefficient(row: Any, k: Any) -> Any:
-                return _all(builder, builder.load(builder.gep(row, [builder.mul(k, ir.Constant(whole, stride))])))
-
+            rows = [c, builder.gep(c, [ir.Constant(whole, ROW)])]
             totals = []
             for row in rows:
-                top = coefficient(row, n)
+                top = _all(builder, builder.load(builder.gep(row, [n])))
                 totals.append([cgutils.alloca_once_value(builder, top) for _ in offsets])
             with cgutils.for_range(builder, n) as loop:
                 at = builder.sub(builder.sub(n, ir.Constant(whole, 1)), loop.index)
                 for row, sums in zip(rows, totals):
-                    next_one = coefficient(row, at)
+                    coefficient = _all(builder, builder.load(builder.gep(row, [at])))
                     for total, x in zip(sums, xs):
-                        builder.store(_multiply_add(builder, builder.load(total), x, next_one), total)
+                        builder.store(_multiply_add(builder, builder.load(total), x, coefficient), total)
             for offset, first, second in zip(offsets, *totals):
                 _store(builder, builder.load(first), to, offset)
                 _store(builder, builder.fmul(builder.load(second), by), to, builder.add(offset, apart))
@@ -92,35 +85,3 @@ def _polynomials(groups: int, stride: int = 1, rows_apart: int = ROW) -> Any:
 
 
 evaluate_8, evaluate_32 = _polynomials(1), _polynomials(4)
-
-LOCAL_TERMS = 8
-LOCAL = LOCAL_TERMS * WIDTH  # numbers of eight local series
-evaluate_local_32 = _polynomials(4, WIDTH, LOCAL)
-"""The same of one of the pairs that `recentre` gives."""
-
-
-@intrinsic
-def recentre(typing: Any, series: Any, degree: Any, places: Any, out: Any) -> Any:
-    """The first terms of a series about eight places: coefficient k about place i at out[8 k + i], and LOCAL further on those
-    of its derivative.
-
-    Horner's scheme for a value and its derivatives at once, each over its factorial.
-    """
-
-    def emit(context: Any, builder: Any, _: Any, values: Any) -> Any:
-        c, n, at, to = values
-        x = _load(builder, at)
-        terms = [cgutils.alloca_once_value(builder, _ZERO) for _ in range(LOCAL_TERMS + 1)]
-        with cgutils.for_range(builder, builder.add(n, ir.Constant(n.type, 1))) as loop:
-            newest = _all(builder, builder.load(builder.gep(c, [builder.sub(n, loop.index)])))
-            below = [newest, *map(builder.load, terms[:-1])]
-            for term, added in zip(terms, below):
-                builder.store(_multiply_add(builder, builder.load(term), x, added), term)
-        for k in range(LOCAL_TERMS):
-            _store(builder, builder.load(terms[k]), to, ir.Constant(n.type, WIDTH * k))
-            factor = ir.Constant(_VECTOR, [k + 1.0] * WIDTH)
-            slope = builder.fmul(builder.load(terms[k + 1]), factor)
-            _store(builder, slope, to, ir.Constant(n.type, LOCAL + WIDTH * k))
-        return context.get_dummy_value()
-
-    return types.void(REALS, types.int64, REALS, REALS), emit
