@@ -51,6 +51,18 @@ def test_bob_and_shadow_are_told_apart(shadow):
     assert found.radius_px == pytest.approx(12.0, abs=0.1)
 
 
+def test_a_shadow_that_the_rim_of_the_picture_cuts_is_found():
+    shadow = (14.0, 12.0, 10.0, 4.0, 0.3)
+    shown = []
+    for patch, guess in seen(shadow):
+        top = slice(0, int(guess.y_px) + 14)
+        shown.append((patch._replace(image=patch.image[top], back=patch.back[top], seen=patch.seen[top]), guess))
+    found = find_shadow(shown, Look(12.0, 0.7, -100.0, 7.0))
+    assert found is not None
+    assert np.all(np.abs(np.subtract(found.shadow, shadow)) < [0.5, 0.5, 0.5, 0.5, 0.03])
+    assert np.hypot(found.x_px, found.y_px) < 0.1
+
+
 def test_no_shadow_is_found_where_there_is_none():
     assert find_shadow(seen(None), Look(12.0, 0.7, -100.0, 2.0)) is None
     assert find_shadow(seen(None), Look(12.0, 0.7, -100.0, 30.0)) is None

@@ -112,24 +112,31 @@ def _beside_even(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarr
     start[8:11] = *_rest_beside(u, v, image, back, size), 0.3
     starts += [fit(s, range(13), 4, 4) for s in (start, _exchanged(start))]
     starts.sort(key=lambda s: s[1])
-    values, with_it = min((fit(start, range(13), 1, 15) for start, _ in starts[:2]), key=lambda s: s[1])
+    tries = [min((fit(start, range(13), 1, 15) for start, _ in starts[:2]), key=lambda s: s[1])]
+    values, with_it = tries[0]
     if abs(values[12]) < abs(values[3]):  # the bob has the sharper edge: they may have been taken for each other
         other = fit(_exchanged(values), range(13), 1, 15)
-        if other[1] < _ALIKE * with_it:
-            values, with_it = other
+        tries.insert(0 if other[1] < _ALIKE * with_it else 1, other)
+    most = (0.75 if look.even else 0.7) * without
+    found = (_read(values, look, back) for values, with_it in tries if with_it <= most)
+    return next((shaded for shaded in found if shaded is not None), None)
+
+
+def _read(values: np.ndarray, look: Look, back: np.ndarray) -> Shaded | None:
+    """The shadow that these values of the model mean; None where they mean none that could be."""
     cx, cy, radius, edge, shade, _, _, gain, right, down, strength, shadow_px, soft = (float(a) for a in values)
     shadow = Shadow(right, down, shadow_px, abs(soft), strength)
-    far = float(np.hypot(shadow.right_px, shadow.down_px))
+    far = float(np.hypot(right, down))
+    least = 0.25 if look.even else 0.5  # a pattern may look a little like a shadow behind most of the bob
     plausible = (
-        0.03 < shadow.strength < 0.95
-        and 0.6 < shadow.radius_px / radius < 1.6
-        and 0.6 < radius / size < 1.3
+        0.03 < strength < 0.95
+        and 0.6 < shadow_px / radius < 1.6
+        and 0.6 < radius / look.radius_px < 1.3
         and shadow.soft_px > max(0.3, 0.6 * abs(edge))
-        and radius + 1 < far + shadow.radius_px < 6 * radius
-        and far
-        > (0.25 if look.even else 0.5) * radius  # a pattern may look a little like a shadow behind most of the bob
+        and radius + 1 < far + shadow_px < 6 * radius
+        and far > least * radius
     )
-    if not plausible or with_it > (0.75 if look.even else 0.7) * without:
+    if not plausible:
         return None
     return Shaded(shadow, cx, cy, radius, max(0.35, abs(edge)), shade - gain * float(np.median(back)))
 
