@@ -68,6 +68,20 @@ def test_no_shadow_is_found_where_there_is_none():
     assert find_shadow(seen(None), Look(12.0, 0.7, -100.0, 30.0)) is None
 
 
+@pytest.mark.parametrize(("across", "down"), [(1.12, 0.94), (1.05, 0.97), (1.03, 0.98)])
+def test_a_bob_that_the_lens_draws_out_has_no_shadow(across, down):
+    rng = np.random.default_rng(8)
+    rows, columns = np.mgrid[0:110, 0:110]
+    wall = np.full((110, 110), 205.0, np.float32)
+    drawn = []
+    for _ in range(8):
+        x, y = rng.uniform(50, 60, 2)
+        bob = ndtr((18.0 - np.hypot((columns - x) / across, (rows - y) / down)) / 2.6)
+        shown = wall * (1 - bob) + 100.0 * bob + rng.normal(0, 1.5, wall.shape)
+        drawn.append((Patch(shown.astype(np.float32), wall, np.full_like(wall, 9.0), 0.0, 0.0), Guess(x, y)))
+    assert find_shadow(drawn, Look(18.5, 2.6, -102.0, 5.0)) is None
+
+
 def test_the_circle_holds_bob_and_shadow():
     x, y, radius = Shadow(9.0, -12.0, 10.0, 2.0, 0.4).circle(100.0, 50.0, 13.0)
     assert np.hypot(x - 100, y - 50) + 13 == pytest.approx(radius)

@@ -136,9 +136,13 @@ def _read(values: np.ndarray, look: Look, back: np.ndarray) -> Shaded | None:
         and radius + 1 < far + shadow_px < 6 * radius
         and far > least * radius
     )
-    if not plausible:
+    wall = gain * float(np.median(back))
+    contrast = shade - wall
+    # two discs of one shade and one edge are one bob that the lens draws out
+    drawn_out = abs(contrast + strength * wall) < 0.15 * abs(contrast) and abs(soft) < 1.5 * abs(edge)
+    if drawn_out or not plausible:
         return None
-    return Shaded(shadow, cx, cy, radius, max(0.35, abs(edge)), shade - gain * float(np.median(back)))
+    return Shaded(shadow, cx, cy, radius, max(0.35, abs(edge)), contrast)
 
 
 def _beside_patterned(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, look: Look) -> Shaded | None:
@@ -171,7 +175,7 @@ def _beside_patterned(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.
         and abs(soft) > _SHADOWY_PX
         and 0.05 < strength < 0.95
         and 0.6 < shadow_px / radius < 1.6
-        and np.hypot(cx - sx, cy - sy) > 0.5 * radius
+        and np.hypot(cx - sx, cy - sy) > shadow_px  # nearer, it may be a bob that the lens draws out
     )
     if not found:
         return None
