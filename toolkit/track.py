@@ -24,6 +24,7 @@ from toolkit.tracking.places import Places
 from toolkit.tracking.scatter import Factors
 from toolkit.tracking.shake import Shake
 from toolkit.tracking.string_line import seen_half
+from toolkit.tracking.swing import Swing
 from toolkit.tracking.verdict import poor_motion, poor_picture, require_pendulum
 from toolkit.tracking.view_fit import Lines
 from toolkit.video import Frame, Video, clock_warnings, open_video
@@ -234,10 +235,9 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     if shake.taken:
         places, swing = shake.checked(places, swing)
     require_pendulum(swing, places, size_px, video.path)
-    found, drawn = places, swing.position(places.t_s)
-    untimely = out_of_time(found, swing, *drawn)
-    stray = lone_strays(found.without(untimely), *drawn)
-    places = found.without(untimely if stray is None else untimely | stray)
+    found, none = places, np.zeros(places.t_s.size, bool)
+    untimely, stray = _out_of_step(found, swing, swing.position(places.t_s), none)
+    places = found.without(untimely | stray)
 
     good = places.good
     misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
@@ -246,11 +246,9 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor)
     lines = strings.seen()
     joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
-    drawn = joint.x_px, joint.y_px  # with tilt, lens and shutter taken out: some are no strays, and others hid in these
-    untimely = out_of_time(found, swing, *drawn)
-    again = lone_strays(found.without(untimely), *drawn, sure=good & ~untimely)
-    stray = stray if again is None else again
-    left = found.without(untimely if stray is None else untimely | stray)
+    # with tilt, lens and shutter taken out some are no strays, and others hid in these
+    untimely, stray = _out_of_step(found, swing, (joint.x_px, joint.y_px), stray, good)
+    left = found.without(untimely | stray)
     if not np.array_equal(left.good, good):
         places, good = left, left.good
         joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
@@ -351,6 +349,16 @@ def _how_followed(
             y=factors.y,
         ),
     ]
+
+
+def _out_of_step(
+    found: Places, swing: Swing, drawn: tuple[np.ndarray, np.ndarray], stray: np.ndarray, sure: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frames (n,) bool whose picture is of another time, and the strays, about the motion as drawn (`stray` where they are too many
+    to tell); `sure`, (n,) bool, were kept before."""
+    untimely = out_of_time(found, swing, *drawn)
+    again = lone_strays(found.without(untimely), *drawn, sure=None if sure is None else sure & ~untimely)
+    return untimely, stray if again is None else again
 
 
 def _require_seen(places: Places, video: Video) -> None:

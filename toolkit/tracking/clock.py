@@ -179,9 +179,9 @@ def lone_strays(
     return stray
 
 
-def strays_told(places: Places, stray: np.ndarray | None) -> list[str]:
+def strays_told(places: Places, stray: np.ndarray) -> list[str]:
     """A sentence on the frames (n,) bool that were left out as strays, if any."""
-    if stray is None or not stray.any():
+    if not stray.any():
         return []
     return [
         said(

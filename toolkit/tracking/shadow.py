@@ -68,8 +68,9 @@ class Shaded(NamedTuple):
     @property
     def taken_for_bob(self) -> bool:
         """Was the bob, which is clear of it, taken to be where its shadow is?"""
+        to_bob = np.hypot(self.x_px, self.y_px)
         to_shadow = np.hypot(self.x_px + self.shadow.right_px, self.y_px + self.shadow.down_px)
-        return bool(to_shadow < 0.3 * self.radius_px < 0.3 * np.hypot(self.x_px, self.y_px))
+        return bool(to_shadow < 0.3 * self.radius_px and to_bob > self.radius_px)
 
 
 def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
