@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import atan2, hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -334,7 +335,7 @@ class Known:
 
     def _guess(self, x: float, y: float, bx: float, by: float) -> Guess:
         px, py = self.pivot or self.swing.pivot_px
-        return Guess(x, y, bx, by, float(np.arctan2(py - y, px - x)))
+        return Guess(x, y, bx, by, atan2(py - y, px - x))
 
     def look_at(self, guess: Guess) -> Look:
         """The bob's looks at a place: nearer to the camera it is larger."""
@@ -358,7 +359,7 @@ class Known:
         """The patch about the guess, with the background behind it, in the pixels of a still camera; as large as the bob
         and its streak need, or ±half."""
         if half is None:
-            streak = 0.5 * float(np.hypot(guess.streak_x_px, guess.streak_y_px))
+            streak = 0.5 * hypot(guess.streak_x_px, guess.streak_y_px)
             half = (1.25 * look.radius_px + 4 * look.edge_px + 4 + streak,) * 2
         dx, dy = self._camera(frame).at(guess.x_px, guess.y_px)
         patch = cut(frame, self.sight, guess.x_px + dx, guess.y_px + dy, *half)

@@ -30,9 +30,12 @@ class Sightings:
         """The disc fitted to sighting k, its centre in pixels of the picture; None where there is none."""
         return self._fit(k, look, (float(self.x_px[k]), float(self.y_px[k])), streak_s, how)
 
-    def fit_from_far(self, k: int, look: Look, streak_s: float) -> np.ndarray | None:
-        """`fit`; and where this sees no outline, once more from where a soft edge, which reaches farther, finds it."""
-        out = self.fit(k, look, streak_s, turns=6)
+    def fit_from_far(
+        self, k: int, look: Look, streak_s: float, near: tuple[float, float] | None = None
+    ) -> np.ndarray | None:
+        """`fit`, from `near` if that is known; and where this sees no outline, once more from where a soft edge, which reaches
+        farther, finds it."""
+        out = self._fit(k, look, near or (float(self.x_px[k]), float(self.y_px[k])), streak_s, {"turns": 6})
         if out is not None and out[_VISIBLE] > 0.5:
             return out
         soft = self.fit(k, look._replace(noise=np.inf), streak_s, turns=12, soften=2.5)
@@ -94,7 +97,7 @@ def learn_looks(
             return Looks(look._replace(radius_free=False))  # a pattern up to the outline: it tells no size, no streak
         if speed.max() * interval_s < 1.0:
             break
-        exposure_s = _exposure(seen, look, fast, interval_s)
+        exposure_s = _exposure(seen, look, fast, interval_s, learned.exposure_s if turn else None)
         if exposure_s is None:
             break
         learned = learned._replace(exposure_s=exposure_s)
@@ -141,30 +144,52 @@ def _size(
     return look._replace(radius_free=True), (float(slope), float(intercept))
 
 
-def _exposure(seen: Sightings, look: Look, fast: np.ndarray, interval_s: float) -> float | None:
-    """The exposure whose streak fits the fastest sightings best; None where hardly one is fitted.
+def _exposure(seen: Sightings, look: Look, fast: np.ndarray, interval_s: float, about_s: float | None) -> float | None:
+    """The exposure whose streak fits the fastest sightings best, looked for from `about_s` on where that is known; None where
+    hardly one is fitted.
 
     A fit that sees no outline says nothing: a long faint streak fits an empty wall well.
     """
     trials = np.linspace(0, 1, 11)
     cost = np.full((trials.size, fast.size), np.nan)
-    for j, part in enumerate(trials):
-        for n, k in enumerate(fast):
-            fit = seen.fit_from_far(k, look, part * interval_s)
-            if fit is not None and fit[_VISIBLE] > 0.5:
-                cost[j, n] = fit[_MISFIT] ** 2
-    cost = cost[:, np.isfinite(cost).sum(axis=0) >= 3]
-    if cost.shape[1] < 3:
+    centres: dict[int, tuple[float, float]] = {}
+    tried: set[int] = set()
+    wanted = {0, 3, 6, 9} if about_s is None else {round(10 * about_s / interval_s)}
+    while wanted - tried:  # until what is best has no untried neighbour
+        for j in sorted(wanted - tried):
+            for n, k in enumerate(fast):
+                fit = seen.fit_from_far(k, look, trials[j] * interval_s, centres.get(n))
+                if fit is not None and fit[_VISIBLE] > 0.5:
+                    cost[j, n] = fit[_MISFIT] ** 2
+                    centres[n] = float(fit[0]), float(fit[1])
+        tried |= wanted
+        total = _total(cost, 1)
+        if total is None:
+            return None
+        best = int(np.argmin(total))
+        wanted = {best - 1, best, best + 1} & set(range(trials.size))
+    total = _total(cost, min(3, len(tried)))
+    if total is None:
         return None
-    cost = np.where(np.isfinite(cost), cost, np.nanmax(cost, axis=0))
-    clear = np.argsort(cost.min(axis=0))[:6]  # not those on which something hides a part of it
-    total = cost[:, clear].sum(axis=1)
     j = int(np.argmin(total))
-    best = trials[j]
-    if 0 < j < trials.size - 1:
+    part = trials[j]
+    if 0 < j < trials.size - 1 and np.isfinite(total[j - 1 : j + 2]).all():
         a, b, c = total[j - 1 : j + 2]
-        best += 0.1 * 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
-    return float(max(0.0, best) * interval_s)
+        part += 0.1 * 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
+    return float(max(0.0, part) * interval_s)
+
+
+def _total(cost: np.ndarray, least: int) -> np.ndarray | None:
+    """(trials,) the sum of the clearest sightings' costs (trials, n), NaN where nothing was fitted, of those that were fitted
+    in so many trials at least; infinite for what was not tried; None where there are fewer than three."""
+    fitted = np.isfinite(cost)
+    often = fitted.sum(axis=0) >= least
+    if often.sum() < 3:
+        return None
+    some = cost[:, often]
+    known = np.where(np.isfinite(some), some, np.nanmax(some, axis=0))
+    clear = np.argsort(known.min(axis=0))[:6]  # not those on which something hides a part of it
+    return np.where(fitted.any(axis=1), known[:, clear].sum(axis=1), np.inf)
 
 
 def light_on(patch: Patch) -> float:

@@ -78,33 +78,36 @@ def best_sight(frames: list[Frame], places: list[tuple[float, float]], radius_px
 
     frames and the bob's centre (x, y) in each; colour is only chosen where it gains much, for its planes are coarse.
     """
-    inside: list[np.ndarray] = []
-    outside: list[np.ndarray] = []
+    views: list[tuple[Frame, tuple[int, int, int, int], np.ndarray]] = []
     half = int(1.7 * radius_px + 4)
     for frame, (x, y) in zip(frames, places):
         x0, y0 = max(0, int(x) - half), max(0, int(y) - half)
         x1, y1 = min(frame.luma.shape[1], int(x) + half), min(frame.luma.shape[0], int(y) + half)
         if x1 - x0 < 4 or y1 - y0 < 4:
             continue
-        planes = [Sight(w).window(frame, x0, y0, x1, y1) for w in (LUMA, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
-        rows, columns = np.mgrid[y0:y1, x0:x1]
-        d = np.hypot(columns - x, rows - y)
-        stack = np.stack(planes, axis=-1)
-        inside.append(stack[d < 0.8 * radius_px])
-        outside.append(stack[d > 1.25 * radius_px + 2])
-    if not inside:
+        rows, columns = np.ogrid[y0:y1, x0:x1]
+        views.append((frame, (x0, y0, x1, y1), np.hypot(columns - x, rows - y)))
+
+    def seen(weights: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Bob and wall in one plane."""
+        planes = [(Sight(weights).window(frame, *box).astype(float), d) for frame, box, d in views]
+        bob = [plane[d < 0.8 * radius_px] for plane, d in planes]
+        return np.concatenate(bob), np.concatenate([plane[d > 1.25 * radius_px + 2] for plane, d in planes])
+
+    if not views:
         return Sight()
-    a, b = np.concatenate(inside).astype(float), np.concatenate(outside).astype(float)
-    difference = np.median(a, axis=0) - np.median(b, axis=0)
-    noise = np.cov(b.T) + 0.5 * np.eye(3)
-    low, high = np.percentile(b[:, 0], [16, 84])
-    by_luma = abs(difference[0]) / min(np.sqrt(noise[0, 0]), 0.5 * (high - low) + 0.7)  # a post beside it is no noise
-    mix = np.linalg.solve(noise, difference)
-    by_mix = float(np.sqrt(difference @ mix))
+    a, b = seen(LUMA)
+    differs = abs(np.median(a) - np.median(b))
+    low, high = np.percentile(b, [16, 84])
+    by_luma = differs / min(np.sqrt(np.var(b, ddof=1) + 0.5), 0.5 * (high - low) + 0.7)  # a post beside it is no noise
     # a wall's texture counts as noise here, but is learned later: where brightness differs much, it will do
-    if not by_mix > 0:
+    if (by_luma > 6 and differs > 20) or (by_luma > 2.5 and differs > 35):
         return Sight()
-    if (by_luma > 6 and abs(difference[0]) > 20) or (by_luma > 2.5 and abs(difference[0]) > 35) or by_mix < 2 * by_luma:
+    inside, outside = (np.array(p) for p in zip((a, b), seen((0.0, 1.0, 0.0)), seen((0.0, 0.0, 1.0))))
+    difference = np.median(inside, axis=1) - np.median(outside, axis=1)
+    mix = np.linalg.solve(np.cov(outside) + 0.5 * np.eye(3), difference)
+    by_mix = float(np.sqrt(difference @ mix))
+    if not by_mix > 2 * by_luma:
         return Sight()
     mix = mix / np.abs(mix).sum()
     return Sight((float(mix[0]), float(mix[1]), float(mix[2])))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import hypot, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,10 +132,24 @@ class Trail:
             if patch is None or found is None or found[2] < 0.5:
                 return None
             return found[0] + patch.x_px, found[1] + patch.y_px, look
+        close = rough_fit(self.batch[i], self.sight, look, guess, self.stage, free=True)
+        if close is not None and self._is_it(close, guess):
+            return close
         wide = rough_fit(self.batch[i], self.sight, look, guess, self.stage)
         # where a wide look does not settle (a highlight on a streaked bob) a close one may
         near = guess if wide is None else Guess(wide[0], wide[1])
         return rough_fit(self.batch[i], self.sight, look, near, self.stage, free=True)
+
+    def _is_it(self, fit: tuple[float, float, Look], guess: Guess) -> bool:
+        """Just where it was to be, and just as it was: it need not be looked for from farther away."""
+        x, y, seen = fit
+        look = self.look
+        return (
+            hypot(x - guess.x_px, y - guess.y_px) < 0.25 * look.radius_px
+            and 0.9 < seen.radius_px / look.radius_px < 1.1
+            and 0.8 < seen.contrast / look.contrast < 1.25
+            and seen.noise < 1.25 * look.noise + 0.5
+        )
 
     def _look_around(self, i: int, x: float, y: float, step: float) -> bool:
         """Not where it should be: the outline of its size that gathers most votes within some diameters and `step`s."""
@@ -242,7 +257,7 @@ def cut(frame: Frame, sight: Sight, x: float, y: float, half: float, half_y: flo
     """The patch of ±half px about (x, y), as far as it lies in the picture (`back` and `seen` are yet to be set)."""
     if half_y is None:
         half_y = half
-    if not np.isfinite(x + y + half + half_y):
+    if not isfinite(x + y + half + half_y):
         return None
     height, width = frame.luma.shape
     x0, x1 = max(0, int(x - half)), min(width, int(x + half) + 2)
