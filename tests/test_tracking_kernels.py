@@ -16,6 +16,7 @@ from toolkit.tracking.stillness import Anchors
 from toolkit.tracking.string_line import measure_string
 from toolkit.tracking.swing import Swing, solve_swing
 from toolkit.tracking.view import NAMES, View
+from toolkit.tracking.view_fit import Lines, _Problem
 from toolkit.video import Frame
 
 ROOT = Path(__file__).parents[1]
@@ -73,19 +74,51 @@ def test_a_camera_shows_what_its_geometry_says():
     np.testing.assert_allclose(view.straight(view.values, *seen), [639.5 + x, 359.5 + y], atol=1e-3)
 
 
-def test_lines_miss_a_pivot_by_their_distance_over_its_uncertainty():
+def _residuals(view: View, t: np.ndarray, places: tuple[np.ndarray, ...], lines: Lines | None) -> _Problem:
+    return _Problem(view, t, *places, lines, (641.0, 58.0, 2.0), {"yaw": (0.1, 0.2)})
+
+
+def test_residuals_are_what_places_and_lines_miss_over_their_uncertainties():
     view, rng = _view(0.0, readout=0.01), np.random.default_rng(8)
-    ends, turned = rng.uniform(0, 700, (4, 25)), rng.normal(0, 2, 25)
-    direction, place = rng.uniform(1e-3, 1e-2, 25), rng.uniform(0.1, 1, 25)
-    pivot, turn = np.array([[640.0], [60.0]]), 1.01 * 0.01 * turned
-    a, b = ends[:2], ends[2:] - pivot
+    v, t, when = view.values.copy(), np.sort(rng.uniform(0, 3, 20)), np.sort(rng.uniform(0, 3, 25))
+    v[7:9] = 0.3, 0.2
+    x, y, half = rng.uniform(300, 900, 20), rng.uniform(300, 700, 20), rng.uniform(50, 150, 25)
+    sx, sy = rng.uniform(0.05, 0.2, (2, 20))
+    direction, place, angle = rng.uniform(1e-3, 1e-2, 25), rng.uniform(0.1, 1, 25), rng.normal(0, 0.3, 25)
+    points = rng.uniform(100, 700, (2, 25))
+    problem = _residuals(view, t, (x, y, sx, sy), Lines(*points, angle, direction, place, half, when))
+    problem.weigh(3.0)
+
+    motion = v[:9] * [1, 1, 1, 1, 1, 1, 1, 1 / 1.01, 1 / 1.01]
+    late = t + 0.01 * view.rows(x, y)
+    px, py = view.see(v, 1.01 * solve_swing(motion, late)[0], late)
+    reach = half / np.sqrt(3) * np.array([np.sin(angle), np.cos(angle)])
+    pivot, a, b = np.array([[640.0], [60.0]]), points - reach, points + reach - [[640.0], [60.0]]
+    turn = 1.01 * 0.01 * solve_swing(motion, when)[1] * 2 * reach[1] / (2 * 359.5)
     b = pivot + np.array([b[0] - turn * b[1], b[1] + turn * b[0]])
     along = (b - a) / np.linalg.norm(b - a, axis=0)
     away = along[1] * (pivot - a)[0] - along[0] * (pivot - a)[1]
-    reach = np.linalg.norm(pivot - (a + b) / 2, axis=0)
-    expected = away / np.sqrt((direction * reach) ** 2 + place**2)
-    found = view.misses(view.values, np.array([*ends, turned, direction, place]))
-    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-9)
+    missed = away / np.sqrt((direction * np.linalg.norm(pivot - (a + b) / 2, axis=0)) ** 2 + place**2)
+    expected = np.concatenate([(px - x) / sx / 3, (py - y) / sy / 3, missed / 3, [0.02 / 0.2, -1 / 2, 2 / 2]])
+    np.testing.assert_allclose(problem.rest(v), expected, rtol=1e-4, atol=1e-4)
+
+    several = np.stack([v, _view(0.03).values, v])
+    np.testing.assert_allclose(problem.rest(several)[2], expected, rtol=1e-4, atol=1e-4)
+    without = _residuals(view, t, (x, y, sx, sy), None).rest(v)
+    np.testing.assert_allclose(without, np.concatenate([3 * expected[:40], expected[-3:]]), rtol=1e-4, atol=1e-4)
+
+
+def test_slopes_are_differences_of_residuals():
+    view, rng = _view(0.02, readout=0.01), np.random.default_rng(3)
+    v, t = view.values.copy(), np.sort(rng.uniform(0, 3, 20))
+    v[7:9] = 0.3, 0.2
+    lines = Lines(*rng.uniform(100, 700, (2, 9)), *rng.uniform(0.01, 0.1, (3, 9)), np.full(9, 90.0), t[:9])
+    problem = _residuals(view, t, tuple(rng.uniform(1, 700, (4, 20))), lines)
+    found = problem.slopes(v, list(range(len(NAMES))))
+    for i in range(len(NAMES)):
+        step = np.eye(len(NAMES))[i] * 20 * problem.steps[i]
+        expected = (problem.rest(v + step) - problem.rest(v - step)) / (40 * problem.steps[i])
+        np.testing.assert_allclose(found[:, i], expected, rtol=1e-2, atol=1e-3 * np.abs(expected).max())
 
 
 def test_pictures_alike_but_for_one_pixel_between_the_rows_looked_at_first():

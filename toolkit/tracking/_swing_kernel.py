@@ -59,14 +59,14 @@ def advance(
 
 def swing(places: Any) -> None:
     """The angle and its rate of each motion at its times, integrated from each to the next."""
-    times, lanes = places[TIMES], reals(places, ROOM)
+    times, count, lanes = places[TIMES], places[COUNT], reals(places, ROOM)
     size = 9 + 3 * times
     theta, rate, w2 = lanes, skip(lanes, _RATE), skip(lanes, _W2)
     sines, cosines = skip(lanes, _SINE), skip(lanes, _COSINE)
     gamma, beta, now = skip(lanes, _GAMMA), skip(lanes, _BETA), skip(lanes, _NOW)
     longest, step, steps = skip(lanes, _LONGEST), skip(lanes, _STEP), skip(lanes, _STEPS)
-    for first in range(0, places[COUNT], LANES):
-        used = places[COUNT] - first if places[COUNT] - first < LANES else LANES
+    for first in range(0, count, LANES):
+        used = count - first if count - first < LANES else LANES
         motions = skip(reals(places, MOTIONS), first * size)
         for k in range(_END):
             lanes[k] = 0.0

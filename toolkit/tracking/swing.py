@@ -7,8 +7,9 @@ see how much the measured positions scatter. It is not the fit of the physics: t
 
 from __future__ import annotations
 
-from ctypes import addressof, c_double
+from ctypes import addressof, c_double, c_void_p, cast
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,8 @@ from toolkit.tracking.least_squares import least_squares
 NAMES = ("pivot_x", "pivot_y", "length", "vertical", "omega2", "gamma", "beta", "theta0", "rate0")
 CALM = {"gamma": (0.0, 0.1), "beta": (0.0, 0.5)}
 """The damping of a pendulum of which little is known yet, as a prior."""
-_LANES = 128  # numbers that the kernel works in, and more
+LANES = 128
+"""Numbers that the kernel works in, and more."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Swing:
         """`angle` at a few times: what is asked on every frame is quicker without arrays."""
         n = len(times_s)
         room = (c_double * (9 + 3 * n))(*self.values.tolist(), *(t - self.t0_s for t in times_s))
-        lanes = (c_double * _LANES)()
+        lanes = (c_double * LANES)()
         call(_kernel(), addressof(room), addressof(lanes), n, 1)
         return room[9 + n : 9 + 2 * n], room[9 + 2 * n :]
 
@@ -108,13 +110,19 @@ def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
     room = np.empty((*t.shape[:-1], 9 + 3 * n))  # of each motion: the values, the times, the angles and their rates
     room[..., :9] = values[..., :9]
     room[..., 9 : 9 + n] = t
-    lanes = np.empty(_LANES)
+    lanes = np.empty(LANES)
     call(_kernel(), address(room), address(lanes), n, room.size // (9 + 3 * n))
     return room[..., 9 + n :].reshape(*t.shape[:-1], 2, n)
 
 
 def _kernel() -> Any:
     return kernel("swing", "toolkit.tracking._swing_kernel", "the swing")
+
+
+@cache
+def swing_address() -> int:
+    """Where the compiled swing is, for another kernel to call."""
+    return int(cast(_kernel(), c_void_p).value or 0)
 
 
 def small_steps(values: np.ndarray) -> np.ndarray:

@@ -146,11 +146,6 @@ class View:
         x, y = self._by_kernel("straight", v, (x, y), 2)
         return x, y
 
-    def misses(self, v: np.ndarray, lines: np.ndarray) -> np.ndarray:
-        """How far lines (7, n) pass the pivot, over the uncertainty there, (n,) or (k, n). Rows: x, y of a place on each as seen,
-        and of a lower one; by how much that is turned since, over factor and readout; σ of direction (rad) and place (px)."""
-        return self._by_kernel("miss", v, tuple(lines), 1)[0]
-
     def _by_kernel(self, name: str, v: np.ndarray, given: tuple[np.ndarray, ...], found: int) -> np.ndarray:
         """What the kernel of that name finds for `v` from the numbers given of each point, (n,) or (k, n) each."""
         sets, middle = np.array(v.reshape(len(NAMES), -1).T, order="C"), np.array(self.middle_px)

@@ -15,11 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from toolkit.motion.compiled import address, call, kernel
 from toolkit.tracking.least_squares import Minimum, least_squares
 from toolkit.tracking.pivot import line_pivot
+from toolkit.tracking.swing import LANES, swing_address
 from toolkit.tracking.swing import NAMES as SWING_NAMES
-from toolkit.tracking.swing import solve_swing
-from toolkit.tracking.view import AT, GROUPS, NAMES, View, motion_of
+from toolkit.tracking.view import AT, GROUPS, NAMES, View
 
 _STEPS = np.array(
     [1e-3, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-4, 1e-6, 1e-5, 1e-5, 1e-7, 1e-3, 1e-3]
@@ -178,6 +179,18 @@ def _spread(least: Minimum, names: tuple[str, ...]) -> np.ndarray:
     return whole
 
 
+def _crossings(lines: Lines, model: View) -> np.ndarray:
+    """Of the lines (9, m) what the residuals need: x and y of two places on each, σ of direction (rad) and place (px), by how
+    much of the readout the lower is seen later, when, and its weight."""
+    # a straight line fitted to a bent string crosses it in the two Gauss points
+    reach = np.maximum(np.nan_to_num(lines.half_px, nan=1.0), 1.0) / np.sqrt(3)
+    dx, dy = reach * np.sin(lines.angle_rad), reach * np.cos(lines.angle_rad)
+    ends = lines.x_px - dx, lines.y_px - dy, lines.x_px + dx, lines.y_px + dy
+    later = np.where(np.isfinite(lines.t_s), model.rows(*ends[2:]) - model.rows(*ends[:2]), 0.0)
+    when = np.nan_to_num(lines.t_s - model.t0_s)
+    return np.array([*ends, lines.sigma_rad, lines.sigma_px, later, when, np.ones_like(dx)])
+
+
 class _Problem:
     """The residuals of a clip."""
 
@@ -193,66 +206,56 @@ class _Problem:
         pivot: tuple[float, float, float] | None,
         prior: dict[str, tuple[float, float]],
     ) -> None:
-        self.model, self.t, self.x, self.y = model, t_s - model.t0_s, x, y
-        self.wx, self.wy = 1 / sx, 1 / sy
-        self.rows = model.rows(x, y)
-        self.weaker = 1.0  # by what all data are, as their residuals are larger or less independent than their σ says
+        self.model = model
         if lines is not None and lines.x_px.size > _MOST // 2:
             lines = lines.of(np.unique(np.linspace(0, lines.x_px.size - 1, _MOST // 2).astype(int)))
-        self.lines, self.pivot = lines, pivot
-        self.line_weight = np.zeros(0) if lines is None else np.ones(lines.x_px.size)
-        self.tied = np.array([AT[name] for name in prior])
-        self.centre, self.width = np.array(list(prior.values())).T
+        # all that is known, in one piece: six lists of the places, nine of the lines, three of the values tied
+        tied = [(AT[name], *pair) for name, pair in prior.items()]
+        if pivot is not None:
+            tied += [(0, pivot[0], pivot[2]), (1, pivot[1], pivot[2])]
+        self.n, self.m, self.tied = t_s.size, 0 if lines is None else lines.x_px.size, len(tied)
+        places = np.array([t_s - model.t0_s, model.rows(x, y), x, y, 1 / sx, 1 / sy])
+        strings = np.zeros((9, 0)) if lines is None else _crossings(lines, model)
+        self.given = np.concatenate([places.ravel(), strings.ravel(), np.array(tied).T.ravel()])
+        self.t, self.wx, self.wy = (self.given[k * self.n :][: self.n] for k in (0, 4, 5))
+        self.line_weight = self.given[6 * self.n + 8 * self.m :][: self.m]
+        self.timeless = np.arange(self.n, dtype=np.int64)
+        times = np.concatenate([places[0], strings[7]])
+        self.order = np.argsort(np.argsort(times, kind="stable")).astype(np.int64)
+        self.turning = bool(strings[6].any())
+        self.weaker = 1.0  # by what all data are, as their residuals are larger or less independent than their σ says
         self.steps = _STEPS.copy()
         self.steps[4] *= abs(model.values[4])
-        if lines is not None:
-            # a straight line fitted to a bent string crosses it in the two Gauss points
-            reach = np.maximum(np.nan_to_num(lines.half_px, nan=1.0), 1.0) / np.sqrt(3)
-            dx, dy = reach * np.sin(lines.angle_rad), reach * np.cos(lines.angle_rad)
-            ends = lines.x_px - dx, lines.y_px - dy, lines.x_px + dx, lines.y_px + dy
-            self.crossing = np.array([*ends, np.zeros_like(dx), lines.sigma_rad, lines.sigma_px])
-            above, below = model.rows(*ends[:2]), model.rows(*ends[2:])
-            self.later = np.where(np.isfinite(lines.t_s), below - above, 0.0)
-            self.line_t = np.nan_to_num(lines.t_s - model.t0_s)
 
-    def rest(self, v: np.ndarray) -> np.ndarray:
-        """Positions (x then y), lines, priors, over their standard uncertainties: (…, r) for v (19,) or (19, k, 1)."""
-        stacked = v.reshape(len(NAMES), -1)
-        angle = self._angles(stacked.T)
-        return self._rest(v, angle[0] if v.ndim == 1 else angle)
-
-    def _angles(self, motions: np.ndarray) -> np.ndarray:
-        """The angle of each of the motions (k, 19) at each position, (k, n)."""
-        return solve_swing(motion_of(motions), self.t + motions[:, 16:17] * self.rows)[:, 0]
-
-    def _rest(self, v: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        x, y = self.model.see(v, v[9] * angle, self.t + v[16] * self.rows)
-        parts = [(x - self.x) * (self.wx / self.weaker), (y - self.y) * (self.wy / self.weaker)]
-        if self.lines is not None:
-            parts.append(self.line_rest(v) * (self.line_weight / self.weaker))
-        v = v if v.ndim == 1 else v[..., 0].T
-        parts.append((v[..., self.tied] - self.centre) / self.width)
-        if self.pivot is not None:
-            parts.append((v[..., :2] - self.pivot[:2]) / self.pivot[2])
-        return np.concatenate(parts, axis=-1)
+    def rest(self, v: np.ndarray, motion: np.ndarray | None = None) -> np.ndarray:
+        """Positions (x then y), lines, priors, over their standard uncertainties: (r,) for v (19,), (k, r) for (k, 19). Of each set
+        the number of its `motion`, (k,) int, may be given, where some share one; a number's first set brings it."""
+        sets = np.array(v, float, ndmin=2, order="C")
+        many = len(sets)
+        if motion is None:
+            motion = np.arange(many, dtype=np.int64)
+        # the lower point of a line is seen later: it is turned back to when the upper one was
+        order = self.order if self.turning and sets[:, 16].any() else self.timeless
+        motions = int(motion.max()) + 1
+        room, at, size = np.empty(2 * self.n + self.m), np.empty(LANES + motions * (9 + 3 * order.size)), order.size
+        its = np.array([address(at) + 8 * LANES, address(at), size, motions, 0])
+        found = np.empty((many, 2 * self.n + self.m + self.tied))
+        numbers = np.array([*self.model.middle_px, self.weaker])
+        work = kernel("rest", "toolkit.tracking._view_kernel", "the camera's view")
+        call(
+            work, address(sets), address(numbers), address(self.given), address(motion), address(order), address(room),
+            address(found), many, self.n, self.m, self.tied, swing_address(), address(its),
+        )  # fmt: skip
+        return found if v.ndim > 1 else found[0]
 
     def slopes(self, v: np.ndarray, index: list[int]) -> np.ndarray:
         """d rest / d v[index], (r, len(index)): the motion is solved anew only for what moves it."""
-        v0 = v[:, None, None]
-        angle = solve_swing(motion_of(v), self.t + v[16] * self.rows)[0]
-        moved = v0 + np.eye(len(NAMES))[:, index][..., None] * self.steps[:, None, None]
-        angles = np.tile(angle, (len(index), 1))
-        moving = [row for row, i in enumerate(index) if 4 <= i <= 9 or i == 16]
-        angles[moving] = self._angles(moved[:, moving, 0].T)
-        return ((self._rest(moved, angles) - self._rest(v, angle)) / self.steps[index][:, None]).T
-
-    def line_rest(self, v: np.ndarray) -> np.ndarray:
-        """How far each line passes the pivot, over its uncertainty there."""
-        if np.any(v[16]) and np.any(self.later):  # the lower point is seen later: turned back to when the upper one was
-            first = v if v.ndim == 1 else v[:, 0, 0]
-            turned = solve_swing(motion_of(first), self.line_t)[1] * self.later
-            return self.model.misses(v, np.array([*self.crossing[:4], turned, *self.crossing[5:]]))
-        return self.model.misses(v, self.crossing)
+        moving = [4 <= i <= 9 or i == 16 for i in index]
+        motion = np.array([0, *np.cumsum(moving) * moving], np.int64)
+        sets = np.tile(v, (len(index) + 1, 1))
+        sets[range(1, len(sets)), index] += self.steps[index]
+        found = self.rest(sets, motion)
+        return ((found[1:] - found[0]) / self.steps[index][:, None]).T
 
     def weigh(self, inflation: float) -> None:
         """Let all data weigh as their residuals say."""
@@ -301,16 +304,17 @@ class _Problem:
         size = np.hypot(left[:n], left[n : 2 * n])
         off = size > max(8.0, 6 * float(np.median(size)))
         if 0 < off.sum() < 0.1 * off.size:
-            self.wx, self.wy = np.where(off, 0.0, self.wx), np.where(off, 0.0, self.wy)
-        if self.lines is not None:
+            self.wx[off] = self.wy[off] = 0.0
+        if self.m:
             # about the point where they meet themselves, or an arc that something else bends would outvote them
             own = values.copy()
             for _ in range(6):
-                rest = self.line_rest(own)
+                self.line_weight[:] = 1.0
+                sets = own + 0.01 * np.eye(3, len(NAMES), -1)
+                rest, *moved = self.rest(sets, np.zeros(3, np.int64))[:, 2 * self.n :][:, : self.m] * self.weaker
                 spread = max(1.0, 1.4826 * float(np.median(np.abs(rest))))
-                self.line_weight = np.where(np.abs(rest) < 4 * spread, 1 / spread, 0.0)
-                moved = own[:, None, None] + 0.01 * np.eye(len(NAMES))[:, :2, None]
-                slopes = ((self.line_rest(moved) - rest) * self.line_weight / 0.01).T
+                self.line_weight[:] = np.where(np.abs(rest) < 4 * spread, 1 / spread, 0.0)
+                slopes = ((moved - rest) * self.line_weight / 0.01).T
                 own[:2] -= np.linalg.lstsq(slopes, rest * self.line_weight, rcond=1e-6)[0]
 
     @property
@@ -360,8 +364,8 @@ class _Problem:
                 v[:, bent] = bells[k].draw(rng, count)
                 v[:, follows] += (v[:, bent] - starts[min(k, len(starts) - 1)][bent]) @ tied.T
                 for _ in range(2):
-                    v[:, follows] += self.rest(v.T[..., None]) @ pull.T
-                left = self.rest(v.T[..., None])
+                    v[:, follows] += self.rest(v) @ pull.T
+                left = self.rest(v)
                 draws = np.concatenate([draws, v])
                 target = np.concatenate([target, -0.5 * np.sum(left**2, axis=1)])
                 counts.append(count)

@@ -104,3 +104,9 @@ def call_terms(typing: Any, address: Any, q: Any, s: Any, out: Any) -> Any:
     """Call terms(q, s, out) at `address`."""
     signature = types.void(types.int64, REALS, REALS, REALS)
     return signature, lambda context, builder, _, values: _call(builder, values)
+
+
+@intrinsic
+def call_kernel(typing: Any, address: Any, places: Any) -> Any:
+    """Call another kernel(places) at `address`."""
+    return types.void(types.int64, WHOLES), lambda context, builder, _, values: _call(builder, values)
