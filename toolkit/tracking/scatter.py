@@ -53,10 +53,13 @@ def true_sigma(
     timely = slow.sum() > 20 and np.mean(square[slow]) > 0.5 * np.mean(square)
     clock = vx * time_sigma_s, vy * time_sigma_s, np.zeros_like(speed)
     found, fits = [], []
-    for (r, s), late in zip(((rx, sx), (ry, sy), across), clock):
+    all_s = np.array([sx, sy, across[1]])
+    all_r = np.array(
+        [_tamed(r / s) * s for r, s in zip((rx, ry, across[0]), all_s)]
+    )  # a few pictures may be of another time
+    for r, s, late, scatter in zip(all_r, all_s, clock, quick_scatter(t_s, all_r, all_s)):
         known = float(np.mean((np.hypot(late, shake_px) / s) ** 2))
-        r = _tamed(r / s) * s  # a few pictures may be of another time
-        quick = _less(quick_scatter(t_s, r, s) ** 2, known)
+        quick = _less(float(scatter) ** 2, known)
         whole = float(np.mean((r / s) ** 2)) / _left(r / s, step_rad) - known
         fits.append(whole <= _FITS**2 * quick)
         if rough or np.any(shake_px) or not (fits[-1] or (still and timely)):
@@ -101,18 +104,23 @@ def _tamed(r: np.ndarray) -> np.ndarray:
     return np.clip(r, np.median(r) - most, np.median(r) + most)
 
 
-def quick_scatter(t_s: np.ndarray, r: np.ndarray, s: np.ndarray) -> float:
-    """Standard deviation of what changes from one to the next in a series (n,) at times t_s, over its own σ, about
+def quick_scatter(t_s: np.ndarray, r: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Standard deviation of what changes from one to the next in series (…, n) at times t_s (n,), over their own σ (…, n), about
     polynomials through neighbours (by divided differences): of the lowest degree above which no more of it goes away."""
     found = []
     for degree in (2, 4, 6, 8):
-        if r.size < 4 * degree:
+        if t_s.size < 4 * degree:
             break
-        t, near_r, near_s = (np.lib.stride_tricks.sliding_window_view(a, degree + 1) for a in (t_s, r, s))
-        apart = (t[:, :, None] - t[:, None, :]) / np.ptp(t, axis=1)[:, None, None]
-        weight = 1 / np.prod(apart + np.eye(degree + 1), axis=2)
-        differences = np.sum(weight * near_r, axis=1) / np.sqrt(np.sum((weight * near_s) ** 2, axis=1))
-        found.append(float(np.sqrt(np.mean(differences**2))))
+        t, near_r, near_s = (np.lib.stride_tricks.sliding_window_view(a, degree + 1, axis=-1) for a in (t_s, r, s))
+        apart = np.ones(t.shape)
+        for k in range(degree + 1):
+            factor = (t - t[:, [k]]) / np.ptp(t, axis=1)[:, None]
+            factor[:, k] = 1.0
+            apart *= factor
+        differences = np.sum(near_r / apart, axis=-1) / np.sqrt(np.sum((near_s / apart) ** 2, axis=-1))
+        found.append(np.sqrt(np.mean(differences**2, axis=-1)))
     if not found:
-        return float(np.sqrt(np.mean((r / s) ** 2)))
-    return next(f for f in found if f < 1.2 * min(found))
+        return np.asarray(np.sqrt(np.mean((r / s) ** 2, axis=-1)))
+    tried = np.array(found)
+    first = np.argmax(tried < 1.2 * tried.min(axis=0), axis=0)
+    return np.asarray(np.take_along_axis(tried, first[None], axis=0)[0])
