@@ -14,6 +14,8 @@ import numpy as np
 
 _TRIED = 0.1  # of a step: how the residuals bend is seen over so much of it
 _BENT = 0.75  # a bend larger than this share of its step is none to believe
+_STRAIGHT = 1e-3  # of the cost: so much less a step, squared, makes of the residuals does not bend
+_HOPELESS = 0.3  # of the gain that settles it: a step that promises less is not taken
 
 
 class Minimum(NamedTuple):
@@ -65,21 +67,26 @@ def least_squares(
         normal, pull = jacobian.T @ jacobian, jacobian.T @ now
         if not np.all(np.isfinite(normal)):
             return None
+        diagonal = normal.diagonal()
         done = False
         for _ in range(8):
-            damped = normal + damping * np.diag(np.diag(normal) + 1e-300)
+            damped = normal.copy()
+            damped.flat[:: len(index) + 1] += damping * (diagonal + 1e-300)
             trial = values.copy()
             try:
                 step = -np.linalg.solve(damped, pull)
-                trial[index] += _TRIED * step
-                bend = ((rest(trial) - now) / _TRIED - jacobian @ step) / _TRIED
-                turned = -np.linalg.solve(damped, jacobian.T @ bend)
+                if -(step @ (2 * pull + normal @ step)) <= _HOPELESS * settled * cost:
+                    done = True
+                    break
+                if (size := float(step @ (diagonal * step))) > _STRAIGHT * cost:
+                    trial[index] += _TRIED * step
+                    bend = ((rest(trial) - now) / _TRIED - jacobian @ step) / _TRIED
+                    turned = -np.linalg.solve(damped, jacobian.T @ bend)
+                    if turned @ (diagonal * turned) <= (_BENT * _BENT) * size:
+                        step += turned
+                    trial = values.copy()
             except np.linalg.LinAlgError:
                 return None
-            size, bent = (v @ (np.diag(normal) * v) for v in (step, turned))
-            if bent <= (_BENT * _BENT) * size:
-                step += turned
-            trial = values.copy()
             trial[index] += step
             after = rest(trial)
             trial_cost = float(after @ after)

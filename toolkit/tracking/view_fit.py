@@ -111,8 +111,12 @@ def fit_view(
     modes = sides[:1]
     shown: tuple[str, ...] = ()
     while modes and len(shown) < len(GROUPS):
+        less, deepest = problem.weaker, modes[0].chi2
         problem.weigh(problem.inflation(modes[0].values))
         chosen = problem.solve(chosen.values, _names(shown), 8) or chosen
+        # data that weigh less leave no less than their weight's share of what they left before, with the same strays left out
+        if not shown and chosen.chi2 - min(1.0, less / problem.weaker) ** 2 * deepest < _CLEAR:
+            break
         modes = problem.modes(modes[0].values, chosen.values)
         if not modes or chosen.chi2 - modes[0].chi2 < _CLEAR:
             break
@@ -223,28 +227,28 @@ class _Problem:
         times = np.concatenate([places[0], strings[7]])
         self.order = np.argsort(np.argsort(times, kind="stable")).astype(np.int64)
         self.turning = bool(strings[6].any())
-        self.weaker = 1.0  # by what all data are, as their residuals are larger or less independent than their σ says
+        self.numbers = np.array([*model.middle_px, 1.0])
         self.steps = _STEPS.copy()
         self.steps[4] *= abs(model.values[4])
 
     def rest(self, v: np.ndarray, motion: np.ndarray | None = None) -> np.ndarray:
         """Positions (x then y), lines, priors, over their standard uncertainties: (r,) for v (19,), (k, r) for (k, 19). Of each set
         the number of its `motion`, (k,) int, may be given, where some share one; a number's first set brings it."""
-        sets = np.array(v, float, ndmin=2, order="C")
-        many = len(sets)
+        sets = v.reshape(-1, len(NAMES)).copy()
+        many = motions = len(sets)
         if motion is None:
             motion = np.arange(many, dtype=np.int64)
+        else:
+            motions = int(motion.max()) + 1
         # the lower point of a line is seen later: it is turned back to when the upper one was
         order = self.order if self.turning and sets[:, 16].any() else self.timeless
-        motions = int(motion.max()) + 1
         room, at, size = np.empty(2 * self.n + self.m), np.empty(LANES + motions * (9 + 3 * order.size)), order.size
         its = np.array([address(at) + 8 * LANES, address(at), size, motions, 0])
         found = np.empty((many, 2 * self.n + self.m + self.tied))
-        numbers = np.array([*self.model.middle_px, self.weaker])
         work = kernel("rest", "toolkit.tracking._view_kernel", "the camera's view")
         call(
-            work, address(sets), address(numbers), address(self.given), address(motion), address(order), address(room),
-            address(found), many, self.n, self.m, self.tied, swing_address(), address(its),
+            work, address(sets), address(self.numbers), address(self.given), address(motion), address(order),
+            address(room), address(found), many, self.n, self.m, self.tied, swing_address(), address(its),
         )  # fmt: skip
         return found if v.ndim > 1 else found[0]
 
@@ -257,9 +261,14 @@ class _Problem:
         found = self.rest(sets, motion)
         return ((found[1:] - found[0]) / self.steps[index][:, None]).T
 
+    @property
+    def weaker(self) -> float:
+        """By what all data are, as their residuals are larger or less independent than their σ says."""
+        return float(self.numbers[2])
+
     def weigh(self, inflation: float) -> None:
         """Let all data weigh as their residuals say."""
-        self.weaker = inflation
+        self.numbers[2] = inflation
 
     def solve(self, start: np.ndarray, names: tuple[str, ...], turns: int) -> Minimum | None:
         values = start.copy()
@@ -363,9 +372,11 @@ class _Problem:
                 v = np.tile(starts[min(k, len(starts) - 1)], (count, 1))
                 v[:, bent] = bells[k].draw(rng, count)
                 v[:, follows] += (v[:, bent] - starts[min(k, len(starts) - 1)][bent]) @ tied.T
-                for _ in range(2):
-                    v[:, follows] += self.rest(v) @ pull.T
+                v[:, follows] += self.rest(v) @ pull.T
                 left = self.rest(v)
+                step = left @ pull.T
+                v[:, follows] += step
+                left += step @ jacobian[:, follows].T  # so short a step is a straight one
                 draws = np.concatenate([draws, v])
                 target = np.concatenate([target, -0.5 * np.sum(left**2, axis=1)])
                 counts.append(count)
