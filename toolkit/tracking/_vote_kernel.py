@@ -27,10 +27,11 @@ def vote(places: Any) -> None:
     weight = skip(columns, 4 * count)
     for k in range(places[REACHES]):
         reach, size = reals(places, NUMBERS)[k], reals(places, NUMBERS)[places[REACHES] + k]
+        part = 1.0 / size
         height, width = math.floor(places[ROWS] / size) + 3, math.floor(places[COLUMNS] / size) + 3
         for i in range(count):
-            u = math.floor((columns[i] + reach * nx[i]) / size + 0.5) + 1
-            v = math.floor((rows[i] + reach * ny[i]) / size + 0.5) + 1
+            u = math.floor((columns[i] + reach * nx[i]) * part + 0.5) + 1
+            v = math.floor((rows[i] + reach * ny[i]) * part + 0.5) + 1
             bins[i] = 0
             if 0 < u < width - 1 and 0 < v < height - 1:
                 bins[i] = v * width + u
@@ -61,10 +62,9 @@ def vote(places: Any) -> None:
             found[6 * k + 3 * which] = (sum_u / total - 1) * size
             found[6 * k + 3 * which + 1] = (sum_v / total - 1) * size
             found[6 * k + 3 * which + 2] = total
-            for i in range(count):  # the second is another one
-                v = bins[i] // width
-                u = bins[i] - v * width
-                if -apart <= v - at_v <= apart and -apart <= u - at_u <= apart:
-                    table[bins[i]] = 0.0
+            left, right = max(at_u - apart, 0), min(at_u + apart + 1, width)
+            for v in range(max(at_v - apart, 0), min(at_v + apart + 1, height)):  # the second is another one
+                for u in range(left, right):
+                    table[v * width + u] = 0.0
         for i in range(count):
             table[bins[i]] = 0.0

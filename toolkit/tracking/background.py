@@ -71,10 +71,15 @@ class Background:
 
         x0, y0, x1, y1 = box
         mean, seen = self.mean[y0:y1, x0:x1], self.seen[y0:y1, x0:x1]
-        known = (seen > 0).astype(np.float32)
-        if not known.any():
+        gaps = seen <= 0
+        if gaps.all() or not gaps.any():
             return
-        level = np.full_like(mean, float(mean[seen > 0].mean()))
+        whole = float(mean[~gaps].mean())
+        rows, columns = (np.flatnonzero(gaps.any(axis=axis)) for axis in (1, 0))
+        about = np.s_[max(0, rows[0] - 41) : rows[-1] + 42, max(0, columns[0] - 41) : columns[-1] + 42]
+        mean, seen = mean[about], seen[about]
+        known = (seen > 0).astype(np.float32)
+        level = np.full_like(mean, whole)
         for width in (81, 31, 11, 5):
             weight = cv2.blur(known, (width, width))
             near = cv2.blur(mean * known, (width, width)) / np.maximum(weight, 1e-6)

@@ -143,13 +143,12 @@ class Known:
                 piece = self.sight.window(batch[i], a + dx, b + dy, c + dx, d + dy)
                 self.back.add(piece, (a, b, c, d), self._dark(x, y, 1.1 * look.radius_px + 2 * look.edge_px + 2), pivot)
         self.back.fill_gaps((x0, y0, x1, y1))
-        beyond = np.ones(self.shape, bool)  # where the bob was not found (yet) the picture is what stands still
-        beyond[y0:y1, x0:x1] = False
         few = [batch[i] for i in scattered(len(batch), 5)]
         plain = self.sight.weights == LUMA
         still = still_picture([f.luma if plain else self.sight.window(f, 0, 0, *self.shape[::-1]) for f in few])
-        np.copyto(self.back.mean, still, where=beyond)
-        self.back.seen[beyond] = 1.0
+        beyond = (np.s_[:y0], np.s_[y1:], np.s_[y0:y1, :x0], np.s_[y0:y1, x1:])
+        for part in beyond:  # where the bob was not found (yet) the picture is what stands still
+            self.back.mean[part], self.back.seen[part] = still[part], 1.0
         if self.front is not None:
             self.back.stand_before(self.front)
 

@@ -14,6 +14,9 @@ import numpy as np
 
 from toolkit.motion.compiled import address, call, kernel
 
+_ROWS = 32  # of some pictures: what stays in the processor's caches
+_EVEN = 0.003  # of their light: so far most rows go before it is called uneven
+
 
 class Hypothesis(NamedTuple):
     """A round moving thing: index into the sampled frames, centre and radius in full-frame px, bob darker (−1) or
@@ -28,26 +31,30 @@ class Hypothesis(NamedTuple):
 
 
 def shrink(plane: np.ndarray, factor: int) -> np.ndarray:
-    """`plane` averaged over factor × factor pixels, float32. Pixel (i, j) is centred on (i + ½)·factor − ½."""
-    import cv2
-
+    """`plane` (h, w) uint8 averaged over factor × factor pixels, float32. Pixel (i, j) is centred on (i + ½)·factor − ½."""
+    if factor == 1:
+        return plane.astype(np.float32)
+    plane = plane if plane.strides[1] == 1 and plane.dtype == np.uint8 else np.ascontiguousarray(plane, np.uint8)
     rows, columns = plane.shape[0] // factor, plane.shape[1] // factor
-    cut = plane[: rows * factor, : columns * factor]
-    if factor > 1:
-        cut = cv2.resize(np.ascontiguousarray(cut), (columns, rows), interpolation=cv2.INTER_AREA)
-    return cut.astype(np.float32)
+    small, row = np.empty((rows, columns), np.float32), np.empty(columns * factor, np.float32)
+    average = kernel("shrink", "toolkit.tracking._shrink_kernel", "the search")
+    call(average, plane.ctypes.data, address(small), address(row), rows, columns, factor, plane.strides[0])
+    return small
 
 
 def still_picture(planes: list[np.ndarray]) -> np.ndarray:
     """The median of each pixel over the planes (h, w): what stands still, where nothing covers it half the time."""
     import cv2
 
-    planes = list(planes)
-    for i in range(len(planes) // 2 + 1):  # a bubble sort as far as the middle: whole pictures at a time
-        for j in range(len(planes) - 1, i, -1):
-            a, b = planes[j - 1], planes[j]
-            planes[j - 1], planes[j] = cv2.min(a, b), cv2.max(a, b)
-    return planes[len(planes) // 2]
+    middle = np.empty_like(planes[0])
+    for top in range(0, middle.shape[0], _ROWS):
+        lines = [plane[top : top + _ROWS] for plane in planes]
+        for i in range(len(lines) // 2 + 1):  # a bubble sort as far as the middle: many pixels at a time
+            for j in range(len(lines) - 1, i, -1):
+                a, b = lines[j - 1], lines[j]
+                lines[j - 1], lines[j] = cv2.min(a, b), cv2.max(a, b)
+        middle[top : top + _ROWS] = lines[len(lines) // 2]
+    return middle
 
 
 def silhouette(image: np.ndarray, back: np.ndarray) -> np.ndarray:
@@ -71,6 +78,9 @@ def even_light(samples: list[np.ndarray]) -> list[np.ndarray]:
     """The pictures (h, w) with each row's brightness as it is on most of them: flicker and drifting light are no motion."""
     if len(samples) < 5:
         return samples
+    rows = np.array([p.mean(axis=1) for p in samples])
+    if np.median(np.abs(rows / np.maximum(np.median(rows, axis=0), 1.0) - 1)) < _EVEN:
+        return samples
     some = np.stack([p[:, ::4] for p in samples])
     gains = np.median(some / np.maximum(np.median(some, axis=0), 1.0), axis=2)
     return [(p / np.clip(g, 0.5, 2.0)[:, None]).astype(np.float32) for p, g in zip(samples, gains)]
@@ -82,32 +92,24 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 24) ->
 
     if len(samples) < 3:
         return []
-    stack = np.stack(samples)
-    spread = np.ptp(stack, axis=0) if len(samples) < 5 else stack.std(axis=0)
+    spread = np.ptp(samples, axis=0) if len(samples) < 5 else _scatter(samples)
     noise = float(np.median(spread))
     moving = cv2.dilate((spread > max(4 * noise, 2.0)).astype(np.uint8), np.ones((3, 3), np.uint8))
     if not moving.any():
         return []
     found: list[Hypothesis] = []
-    table = _table(stack.shape[1:], 1.0)
-    biggest = 0.2 * min(stack.shape[1:])
+    table = _table(moving.shape, 1.0)
+    biggest = 0.2 * min(moving.shape)
     radii = [r for r in 2.5 * 1.25 ** np.arange(16) if r <= biggest]
     reaches = np.array([(sign * r, max(1.0, r / 7)) for r in radii for sign in (-1, 1)]).reshape(-1, 2)
-    here = np.nonzero(moving)
+    here = np.flatnonzero(moving)
     for k, picture in enumerate(samples):
-        gx = cv2.Sobel(picture, cv2.CV_32F, 1, 0, scale=0.125)[here]
-        gy = cv2.Sobel(picture, cv2.CV_32F, 0, 1, scale=0.125)[here]
-        size = np.hypot(gx, gy)
-        strong = np.flatnonzero(size > max(2.0, 2 * noise))
-        if strong.size < 8:
+        edges = _edges(picture, here, max(2.0, 2 * noise))
+        if edges.shape[1] < 8:
             continue
-        length = size[strong]
-        if strong.size > 4000:
-            keep = np.argpartition(length, -4000)[-4000:]
-            strong, length = strong[keep], length[keep]
-        weight = np.sqrt(length / np.percentile(length, 90)).clip(0, 1)
-        rows, columns = (line[strong] for line in here)
-        edges = np.array([columns, rows, gx[strong] / length, gy[strong] / length, weight], float)
+        if edges.shape[1] > 4000:
+            edges = np.take(edges, np.argpartition(edges[4], -4000)[-4000:], axis=1)
+        edges[4] = np.sqrt(edges[4] / np.percentile(edges[4], 90)).clip(0, 1)
         for (reach, _), both in zip(reaches.tolist(), _vote(edges, reaches, picture.shape, table).tolist()):
             radius, sign = abs(reach), 1 if reach > 0 else -1
             for x, y, votes in both:
@@ -191,6 +193,29 @@ def _distinct(found: list[Hypothesis], most: int) -> list[Hypothesis]:
         if (rivals if second else len(alike) - rivals) < 3:
             kept.append(h)
     return kept
+
+
+def _scatter(samples: list[np.ndarray]) -> np.ndarray:
+    """The standard deviation of each pixel, (h, w) float32."""
+    import cv2
+
+    total, squares = np.zeros_like(samples[0]), np.zeros_like(samples[0])
+    for picture in samples[1:]:  # less the first one, so that single precision is enough
+        away = cv2.subtract(picture, samples[0])
+        cv2.accumulate(away, total)
+        cv2.accumulateSquare(away, squares)
+    n = len(samples)
+    return np.sqrt(np.maximum(squares / n - (total / n) ** 2, 0.0))
+
+
+def _edges(picture: np.ndarray, here: np.ndarray, least: float) -> np.ndarray:
+    """(5, n) the columns, rows, directions of the slope (x, y) and slopes of the pixels `here` (m,) whose slope is more than
+    `least`."""
+    edges, count, limit = np.empty((5, here.size)), np.empty(1, np.int64), np.array([least])
+    find = kernel("edges", "toolkit.tracking._shrink_kernel", "the search")
+    arrays = np.ascontiguousarray(picture), here.astype(np.int64, copy=False), limit, edges, count
+    call(find, *(address(a) for a in arrays), here.size, *picture.shape)
+    return np.ascontiguousarray(edges[:, : count[0]])
 
 
 def _vote(edges: np.ndarray, reaches: np.ndarray, shape: tuple[int, ...], table: np.ndarray) -> np.ndarray:

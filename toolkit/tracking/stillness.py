@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolkit.motion.compiled import address, call, kernel
+from toolkit.tracking.search import shrink
 
 
 class CameraShift(NamedTuple):
@@ -31,6 +32,8 @@ class CameraShift(NamedTuple):
 
 STILL = CameraShift(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _HALF = 12
+_BLUR = 3
+_WIDTH = 640  # px: so wide a picture shows where corners are
 _WORST_SIGMA_PX = 0.15
 
 
@@ -41,19 +44,24 @@ class Anchors:
         """`moving` (h, w) bool is True where the bob or the string may come."""
         import cv2
 
-        picture = np.ascontiguousarray(luma)
-        mask = np.where(moving, 0, 255).astype(np.uint8)
-        rim = _HALF + 4
+        factor = max(1, luma.shape[1] // _WIDTH)
+        small = shrink(luma, factor).astype(np.uint8)
+        mask = np.where(moving[factor // 2 :: factor, factor // 2 :: factor], 0, 255).astype(np.uint8)
+        mask = np.ascontiguousarray(mask[: small.shape[0], : small.shape[1]])
+        rim = -(-(_HALF + 4) // factor)
         mask[:rim], mask[-rim:], mask[:, :rim], mask[:, -rim:] = 0, 0, 0, 0
-        smooth = cv2.GaussianBlur(picture, (0, 0), 1.0)
-        corners = cv2.goodFeaturesToTrack(smooth, most, 0.01, 2.0 * _HALF, mask=mask, blockSize=9)
-        points = np.zeros((0, 2)) if corners is None else corners.reshape(-1, 2)
-        noise = 1.0 + _pixel_noise(picture)
-        points = np.array([p for p in points if _place_sigma(smooth, p, noise) < _WORST_SIGMA_PX]).reshape(-1, 2)
-        self.points = np.round(points).astype(np.int64)
-        self.windows = np.zeros((len(self.points), 2 * _HALF + 1, 2 * _HALF + 1), np.float32)
-        for k, (x, y) in enumerate(self.points):
-            self.windows[k] = smooth[y - _HALF : y + _HALF + 1, x - _HALF : x + _HALF + 1]
+        smooth = cv2.GaussianBlur(small, (0, 0), 1.0 / factor)
+        apart, block = 2.0 * _HALF / factor, max(3, round(9 / factor) | 1)
+        corners = cv2.goodFeaturesToTrack(smooth, most, 0.01, apart, mask=mask, blockSize=block)
+        points = np.zeros((0, 2)) if corners is None else (corners.reshape(-1, 2) + 0.5) * factor - 0.5
+        noise = 1.0 + _pixel_noise(luma)
+        points = np.round(points).astype(np.int64)
+        windows = [_window(luma, x, y) for x, y in points.tolist()]
+        good = [k for k, window in enumerate(windows) if _place_sigma(window, noise) < _WORST_SIGMA_PX]
+        self.points = points[good]
+        self.windows = np.zeros((len(good), 2 * _HALF + 1, 2 * _HALF + 1), np.float32)
+        for k, which in enumerate(good):
+            self.windows[k] = windows[which]
         self.centre = (luma.shape[1] / 2, luma.shape[0] / 2)
         self._last = np.zeros((len(self.points), 2))
         self._found = np.zeros(len(self.points))  # on how many pictures each window was
@@ -123,14 +131,21 @@ class Anchors:
 
 def _pixel_noise(picture: np.ndarray) -> float:
     """Noise of single pixels in grey levels, from the median of their second differences."""
-    some = picture[::4].astype(np.float32)
+    some = picture[:: max(4, picture.shape[0] // 90)].astype(np.float32)
     return 1.4826 * float(np.median(np.abs(some[:, 2:] - 2 * some[:, 1:-1] + some[:, :-2]))) / np.sqrt(6)
 
 
-def _place_sigma(smooth: np.ndarray, point: np.ndarray, noise: float) -> float:
-    """How well noise lets the window at the point be placed, px, along its worse direction."""
-    x, y = (round(float(v)) for v in point)
-    window = smooth[y - _HALF : y + _HALF + 1, x - _HALF : x + _HALF + 1].astype(float)
-    gy, gx = np.gradient(window)
+def _window(luma: np.ndarray, x: int, y: int) -> np.ndarray:
+    """What lies about a pixel, smoothed."""
+    import cv2
+
+    reach = _HALF + _BLUR
+    some = np.ascontiguousarray(luma[y - reach : y + reach + 1, x - reach : x + reach + 1])
+    return cv2.GaussianBlur(some, (2 * _BLUR + 1,) * 2, 1.0)[_BLUR:-_BLUR, _BLUR:-_BLUR]
+
+
+def _place_sigma(window: np.ndarray, noise: float) -> float:
+    """How well noise lets the window be placed, px, along its worse direction."""
+    gy, gx = np.gradient(window.astype(float))
     normal = np.array([[np.sum(gx * gx), np.sum(gx * gy)], [np.sum(gx * gy), np.sum(gy * gy)]])
     return noise / float(np.sqrt(max(np.linalg.eigvalsh(normal)[0], 1e-9)))
