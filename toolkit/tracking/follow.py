@@ -17,7 +17,7 @@ from toolkit.tracking.repeat import alike, thinned
 from toolkit.tracking.search import find_round_near, silhouette
 from toolkit.tracking.stillness import CameraShift
 from toolkit.tracking.string_line import measure_string
-from toolkit.tracking.swing import CALM, fit_swing
+from toolkit.tracking.swing import CALM, fit_swing, start_swing
 from toolkit.tracking.trail import Rough
 from toolkit.video import Frame
 
@@ -365,16 +365,20 @@ class Follower(Known):
         return x + ox, y + oy, vx, vy
 
     def _refit(self) -> None:
-        """Fit the motion to what was measured last, to see through a gap."""
+        """Fit the motion to what was measured last, and found ahead of that, to see through a gap."""
         r = self.record
         self._fitted_at = len(r.index)
         good = [k for k in range(max(0, len(r.ok) - 600), len(r.ok)) if r.ok[k]]
         if len(good) < 20:
             return
-        t, x, y = np.array([(r.t_s[k], r.place[k].x_px, r.place[k].y_px) for k in good]).T
-        swing = fit_swing(t, x, y, np.full(t.size, 0.5), self.swing.values_at(t[0]), prior=CALM)
-        if swing is not None and swing.rms_px < 0.25 * self.look.radius_px + 1:
-            self.swing = swing
+        points = [(r.t_s[k], r.place[k].x_px, r.place[k].y_px) for k in good]
+        points += [(f.t_s, *self.found[f.index]) for f in self.first[len(r.index) :] if f.index in self.found]
+        t, x, y = np.array(points).T
+        for start in (self.swing.values_at(t[0]), start_swing(t, x, y)):
+            swing = None if start is None else fit_swing(t, x, y, np.full(t.size, 0.5), start, prior=CALM)
+            if swing is not None and swing.rms_px < 0.25 * self.look.radius_px + 1:
+                self.swing = swing
+                return
 
     def _update_background(self, patch: Patch, place: Place, guess: Guess) -> None:
         rows, columns = patch.image.shape

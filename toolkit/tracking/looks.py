@@ -129,6 +129,8 @@ def _size(
     look: Look, fits: dict[int, np.ndarray], x_px: np.ndarray, radius: float | None
 ) -> tuple[Look, tuple[float, float] | None]:
     """The looks that most fits agree on; and the line along which the radius grows, where the bob is larger on one side."""
+    usual = sorted(f[_CONTRAST] for f in fits.values())[len(fits) // 2]
+    fits = {k: f for k, f in fits.items() if 0.5 < f[_CONTRAST] / usual < 2.0}  # the others ran away
     table = np.array(list(fits.values()))
     middle = np.median(table, axis=0)
     size, edge, contrast, noise = (float(middle[n]) for n in (_RADIUS, _EDGE, _CONTRAST, _MISFIT))

@@ -48,7 +48,7 @@ def shake_on_string(places: Places, lines: Lines) -> tuple[np.ndarray, np.ndarra
     total = _size(pivot[used])
     noise = abs(length) * float(np.median(lines.sigma_rad[used]))
     hand = _size(_out_of_step(pivot[used], angle[used], t[used]))
-    if hand < max(_LEAST_PX + 3 * noise, _OUT_OF_STEP * total):
+    if hand < max(_LEAST_PX, 3 * noise, _OUT_OF_STEP * total):
         return None
     known = np.flatnonzero(used)
     shake = np.column_stack([np.interp(t, t[known], column) for column in pivot[known].T])

@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.errors import JobError
 from toolkit.tracking.acquire import REMEDY
 from toolkit.tracking.places import Places
-from toolkit.tracking.swing import CALM, Swing, fit_swing, start_swing
+from toolkit.tracking.swing import CALM, NAMES, Swing, fit_swing, start_swing
 
 
 def whole_swing(followed: Swing, places: Places, path: Path) -> Swing:
@@ -42,9 +42,12 @@ def _grown(values: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, chos
         if part.size >= 12:
             p = part[:: max(1, part.size // 1500)]
             calm = CALM if stop < t[-1] else None
-            swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=calm)
-            if swing is None and calm is None:
-                swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), values, prior=CALM)
+            # damping seen over a second or so may be none, and leads nowhere later
+            undamped = np.where([name in CALM for name in NAMES], 0.0, values)
+            for start, prior in ((values, calm), (values, CALM), (undamped, CALM)):
+                swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), start, prior=prior)
+                if swing is not None:
+                    break
             if swing is None:
                 return None
             values = swing.values
