@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from toolkit.motion.compiled import keeps_objects
 from toolkit.tracking.background import Background
 from toolkit.tracking.repeat import alike
+from toolkit.tracking.search import _edges, shrink
 from toolkit.tracking.stillness import Anchors
 from toolkit.tracking.string_line import measure_string
 from toolkit.tracking.swing import Swing, solve_swing
@@ -152,6 +153,42 @@ def test_background_is_the_mean_of_what_neither_bob_nor_string_hides():
         count[y0:y1, x0:x1] += open_
     np.testing.assert_array_equal(back.seen, count)
     np.testing.assert_allclose(back.mean, total / np.maximum(count, 1), atol=1e-3)
+
+
+def test_many_pictures_taken_in_at_once_are_those_taken_in_one_by_one():
+    rng = np.random.default_rng(8)
+    one, other, box, pivot = Background((90, 120)), Background((90, 120)), (8, 5, 110, 88), (60.0, -200.0)
+    pictures = list(rng.integers(0, 256, (12, 90, 120), dtype=np.uint8))
+    shifts = [(int(dx), int(dy)) for dx, dy in rng.integers(-12, 13, (12, 2))]
+    bobs = [(float(x), float(y), 9.0) for x, y in rng.uniform(20, 80, (12, 2))]
+    for picture, (dx, dy), bob in zip(pictures, shifts, bobs, strict=True):
+        a, b, c, d = max(8, -dx), max(5, -dy), min(110, 120 - dx), min(88, 90 - dy)
+        one.add(picture[b + dy : d + dy, a + dx : c + dx].astype(np.float32), (a, b, c, d), bob, pivot)
+    other.add_all(pictures, shifts, box, bobs, pivot)
+    assert one.seen.max() == 12
+    np.testing.assert_array_equal(other.seen, one.seen)
+    np.testing.assert_allclose(other.mean, one.mean, atol=1e-3)
+
+
+@pytest.mark.parametrize("factor", [2, 3, 5])
+def test_a_small_picture_is_the_mean_of_squares(factor: int):
+    picture = np.random.default_rng(9).integers(0, 256, (47, 73), dtype=np.uint8)
+    rows, columns = 47 // factor, 73 // factor
+    squares = picture[: rows * factor, : columns * factor].reshape(rows, factor, columns, factor)
+    for same in (picture, np.asfortranarray(picture)):
+        assert np.abs(shrink(same, factor) - squares.mean(axis=(1, 3))).max() <= 0.5 + 1e-4
+
+
+def test_edges_are_where_the_picture_is_steep():
+    cv2 = pytest.importorskip("cv2")
+    picture = gaussian_filter(np.random.default_rng(10).normal(100, 60, (40, 55)), 1.0).astype(np.float32)
+    gx, gy = (cv2.Sobel(picture, cv2.CV_32F, *way, scale=0.125) for way in ((1, 0), (0, 1)))
+    slope = np.hypot(gx, gy)
+    columns, rows, nx, ny, size = _edges(picture, np.arange(picture.size), 4.0)
+    found = np.zeros(picture.shape, bool)
+    found[rows.astype(int), columns.astype(int)] = True
+    np.testing.assert_array_equal(found, slope > 4.0)
+    np.testing.assert_allclose([nx * size, ny * size, size], [gx[found], gy[found], slope[found]], atol=1e-3)
 
 
 @pytest.mark.parametrize("turns", range(4))

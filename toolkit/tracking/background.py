@@ -8,6 +8,7 @@ import numpy as np
 
 from toolkit.motion.compiled import address, call, kernel
 
+_MOST = 60.0  # frames
 _BEFORE = -1e9  # plus one it stays what it is, and what is mixed with it is negative
 
 
@@ -26,7 +27,7 @@ class Background:
         bob: tuple[float, float, float],
         pivot: tuple[float, float] | None,
         gain: float = 1.0,
-        most: float = 60.0,
+        most: float = _MOST,
     ) -> None:
         """Take in the piece box = (x0, y0, x1, y1) of `plane`, whose first pixel is (x0, y0) of the whole frame.
 
@@ -34,10 +35,8 @@ class Background:
         fade, so that slow changes of light are followed.
         """
         x0, y0, x1, y1 = box
-        bx, by, radius = bob
-        ux, uy = (pivot[0] - bx, pivot[1] - by) if pivot is not None else (0.0, 0.0)
-        length = math.sqrt(ux * ux + uy * uy) + 1e-9
-        numbers = np.array([bx - x0, by - y0, radius, ux / length, uy / length, 1 / gain, most])
+        numbers = np.array(_hidden(bob, pivot, gain, most))
+        numbers[:2] -= x0, y0
         plane = np.ascontiguousarray(plane, np.float32)
         skipped = 4 * (y0 * self.mean.shape[1] + x0)
         add = kernel("add", "toolkit.tracking._back_kernel", "the background's mean")
@@ -45,6 +44,27 @@ class Background:
             add, plane.ctypes.data, address(self.mean) + skipped, address(self.seen) + skipped, address(numbers),
             y1 - y0, x1 - x0, plane.shape[1], self.mean.shape[1],
         )  # fmt: skip
+
+    def add_all(
+        self,
+        pictures: list[np.ndarray],
+        shifts: list[tuple[int, int]],
+        box: tuple[int, int, int, int],
+        bobs: list[tuple[float, float, float]],
+        pivot: tuple[float, float] | None,
+    ) -> None:
+        """Take in the box of each whole picture (h, w) uint8, whose pixels lie one beside the other in each row, moved by its
+        shift (x, y), as `add` does one by one."""
+        height, width = self.mean.shape
+        x0, y0, x1, y1 = box
+        table = [
+            (p.ctypes.data, p.strides[0], dy, dx, max(x0, -dx), max(y0, -dy), min(x1, width - dx), min(y1, height - dy))
+            for p, (dx, dy) in zip(pictures, shifts)
+        ]
+        each = np.array([_hidden(bob, pivot) for bob in bobs])
+        arrays = np.array(table, np.int64), self.mean, self.seen, each, np.empty(width, np.float32)
+        add_all = kernel("add_all", "toolkit.tracking._back_kernel", "the background's mean")
+        call(add_all, *(address(a) for a in arrays), len(table), y0, y1, width)
 
     def stand_before(self, front: np.ndarray) -> None:
         """What is seen at these pixels, (h, w) bool, hides the bob."""
@@ -85,3 +105,13 @@ class Background:
             near = cv2.blur(mean * known, (width, width)) / np.maximum(weight, 1e-6)
             level = np.where(weight > 0.02, near, level)
         np.copyto(mean, level, where=known == 0)
+
+
+def _hidden(
+    bob: tuple[float, float, float], pivot: tuple[float, float] | None, gain: float = 1.0, most: float = _MOST
+) -> tuple[float, ...]:
+    """What the kernel is to know of one picture."""
+    bx, by, radius = bob
+    ux, uy = (pivot[0] - bx, pivot[1] - by) if pivot is not None else (0.0, 0.0)
+    length = math.sqrt(ux * ux + uy * uy) + 1e-9
+    return bx, by, radius, ux / length, uy / length, 1 / gain, most

@@ -133,18 +133,21 @@ class Known:
         x1, y1 = min(self.shape[1], int(xs.max() + grow)), min(self.shape[0], int(ys.max() + grow))
         every = max(1, len(batch) // 40)
         pivot = self.pivot or self.swing.pivot_px
-        for i, (x, y) in points.items():
-            if i % every == 0:
-                dx, dy = (round(v) for v in self._camera(batch[i]).at(x, y))
+        some = {i: place for i, place in points.items() if i % every == 0}
+        shifts = [(round(dx), round(dy)) for dx, dy in (self._camera(batch[i]).at(*some[i]) for i in some)]
+        bobs = [self._dark(x, y, 1.1 * look.radius_px + 2 * look.edge_px + 2) for x, y in some.values()]
+        plain = self.sight.weights == LUMA
+        if plain and some and batch[0].luma.strides[1] == 1:  # it was not turned
+            self.back.add_all([batch[i].luma for i in some], shifts, (x0, y0, x1, y1), bobs, pivot)
+        else:
+            for i, (dx, dy), bob in zip(some, shifts, bobs):
                 a, b = max(x0, -dx), max(y0, -dy)
                 c, d = min(x1, self.shape[1] - dx), min(y1, self.shape[0] - dy)
-                if c - a < 4 or d - b < 4:
-                    continue
-                piece = self.sight.window(batch[i], a + dx, b + dy, c + dx, d + dy)
-                self.back.add(piece, (a, b, c, d), self._dark(x, y, 1.1 * look.radius_px + 2 * look.edge_px + 2), pivot)
+                if c - a >= 4 and d - b >= 4:
+                    piece = self.sight.window(batch[i], a + dx, b + dy, c + dx, d + dy)
+                    self.back.add(piece, (a, b, c, d), bob, pivot)
         self.back.fill_gaps((x0, y0, x1, y1))
         few = [batch[i] for i in scattered(len(batch), 5)]
-        plain = self.sight.weights == LUMA
         still = still_picture([f.luma if plain else self.sight.window(f, 0, 0, *self.shape[::-1]) for f in few])
         beyond = (np.s_[:y0], np.s_[y1:], np.s_[y0:y1, :x0], np.s_[y0:y1, x1:])
         for part in beyond:  # where the bob was not found (yet) the picture is what stands still
