@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
-
 from toolkit.motion.kernels.pointer import greys, reals, skip
+from toolkit.tracking._sine import part
 
 # The caller's places: addresses of the picture and of the numbers (bob x and y, pivot x and y, radius, how far from the bob
 # to start), then of the result and of room to work in; then the picture's rows and columns, and bytes from one row and
@@ -21,32 +20,29 @@ WIDTH2 = 1.5 * 1.5  # the ridge's variance, px²
 _WIDE = 2 * HALF + 1
 SPARE = max(STRIPS * STRIP, SECTIONS * _WIDE) + 2 * _WIDE + 2 * ENDS
 
-_part = njit(error_model="numpy", no_rewrites=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
-
-@_part
-def brightness(places: Any, x: float, y: float) -> float:
+@part
+def brightness(picture: Any, down: int, right: int, x: float, y: float) -> float:
     """The picture between its pixels."""
-    down, right = places[DOWN], places[RIGHT]
-    ix, iy = math.floor(x), math.floor(y)
+    ix, iy = int(x), int(y)
     fx, fy = x - ix, y - iy
-    at = skip(greys(places, PICTURE), iy * down + ix * right)
+    at = skip(picture, iy * down + ix * right)
     top = at[0] * (1.0 - fx) + at[right] * fx
     bottom = at[down] * (1.0 - fx) + at[down + right] * fx
     return top * (1.0 - fy) + bottom * fy
 
 
-@_part
+@part
 def clearest(places: Any, strips: Any, bx: float, by: float, ux: float, uy: float, start: float, far: float) -> float:
     """The slope against the pivot's direction at which the line from the bob is most unlike both its sides; 0 unless it is
     clearer by far than what lies straight ahead."""
-    middle = STRIP // 2
+    middle, picture, down, right = STRIP // 2, greys(places, PICTURE), places[DOWN], places[RIGHT]
     for k in range(STRIPS):
         along = start + (k + 0.5) * (far - start) / STRIPS
         for j in range(STRIP):
             x, y = bx + ux * along - uy * (j - middle), by + uy * along + ux * (j - middle)
             inside = x >= 0.0 and y >= 0.0 and x < places[COLUMNS] - 1 and y < places[ROWS] - 1
-            strips[k * STRIP + j] = brightness(places, x, y) if inside else math.nan
+            strips[k * STRIP + j] = brightness(picture, down, right, x, y) if inside else math.nan
     plain = best = slope = 0.0
     for i in range(-SLOPES, SLOPES + 1):
         sum1 = sum2 = 0.0
@@ -73,6 +69,7 @@ def ridge(places: Any) -> None:
     numbers, result, rest_of = reals(places, NUMBERS), reals(places, RESULT), reals(places, ROOM)
     shape = skip(rest_of, SPARE - 2 * _WIDE - 2 * ENDS)  # of the ridge
     profile = skip(shape, _WIDE)
+    picture, down, right = greys(places, PICTURE), places[DOWN], places[RIGHT]
     bx, by, radius, start = numbers[0], numbers[1], numbers[4], numbers[5]
     ux, uy = numbers[2] - bx, numbers[3] - by
     length = math.sqrt(ux * ux + uy * uy)
@@ -80,8 +77,10 @@ def ridge(places: Any) -> None:
     if not length >= 2.0 * radius + 20.0:
         return
     ux, uy = ux / length, uy / length
+    square = 0.0
     for j in range(_WIDE):
         shape[j] = math.exp(-(j - HALF) * (j - HALF) / (2.0 * WIDTH2))
+        square += shape[j] * shape[j]
     far = length - 4.0
     a, middle = 0.0, 0.0  # the line: across = a + b (along − middle)
     b = clearest(places, rest_of, bx, by, ux, uy, start, start + 60.0 if start + 60.0 < far else far)
@@ -97,7 +96,7 @@ def ridge(places: Any) -> None:
         apart = (end - start) / sections
         for _ in range(3):
             # the height of the ridge is fitted with the line held, then the line with the height held
-            hh = hp = 0.0
+            hp = 0.0
             used = 0
             for k in range(sections):
                 along = start + (k + 0.5) * apart
@@ -111,18 +110,18 @@ def ridge(places: Any) -> None:
                 if (y if y < ey else ey) < 0.0 or (y if y > ey else ey) >= places[ROWS] - 1:
                     continue
                 for j in range(2 * ENDS + 1):
-                    profile[j] = brightness(places, x - uy * j, y + ux * j)
+                    profile[j] = brightness(picture, down, right, x - uy * j, y + ux * j)
                 level = tilt = 0.0
                 for j in range(3):
                     level += (profile[j] + profile[2 * ENDS - j]) / 6.0
                     tilt += (profile[2 * ENDS - j] - profile[j]) / 42.0
                 for j in range(_WIDE):
                     rest[j] = profile[j + ENDS - HALF] - level - tilt * (j - HALF)
-                    hh += shape[j] * shape[j]
                     hp += shape[j] * rest[j]
                 used += 1
             if used < 12:
                 return
+            hh = used * square
             height = hp / hh
             n00 = n01 = n11 = r0 = r1 = squares = 0.0
             count = 0
@@ -131,18 +130,21 @@ def ridge(places: Any) -> None:
                 if rest[0] != rest[0]:
                     continue
                 lever = start + (k + 0.5) * apart - middle
+                steep = pull = 0.0
                 for j in range(_WIDE):
                     left = rest[j] - height * shape[j]
                     if abs(left) > 1.5 * abs(height) + 12.0:
                         continue
-                    slope = height * shape[j] * (j - HALF) / WIDTH2
-                    n00 += slope * slope
-                    n01 += slope * slope * lever
-                    n11 += slope * slope * lever * lever
-                    r0 += slope * left
-                    r1 += slope * left * lever
+                    slope = height * shape[j] * ((j - HALF) / WIDTH2)
+                    steep += slope * slope
+                    pull += slope * left
                     squares += left * left
                     count += 1
+                n00 += steep
+                n01 += steep * lever
+                n11 += steep * lever * lever
+                r0 += pull
+                r1 += pull * lever
             determinant = n00 * n11 - n01 * n01
             if count < 60 or not determinant > 1e-12 * n00 * n11:
                 return
