@@ -86,12 +86,15 @@ def _waves(phase: np.ndarray) -> np.ndarray:
     return np.stack([np.ones_like(phase), *parts], axis=-1)
 
 
-def fit_each(show: Show, places: Mapping[int, tuple[float, float]], look: Look) -> dict[int, np.ndarray]:
-    """The disc of about this look (radius and edge are fitted too) near these places, by the frame; where enough of it shows."""
+def fit_each(
+    show: Show, places: Mapping[int, tuple[float, float]], look: Look, far: bool = True
+) -> dict[int, np.ndarray]:
+    """The disc of about this look (radius and edge are fitted too) near these places, or just there if not `far`, by the frame;
+    where enough of it shows."""
     found = {}
     look = look._replace(noise=np.inf)
     for i, (x, y) in places.items():
-        for how in ({"soften": 2.5, "turns": 12}, {"calibrate": True, "turns": 10}):
+        for how in ({"soften": 2.5, "turns": 12}, {"calibrate": True, "turns": 10})[0 if far else 1 :]:
             guess, patch = show(i, x, y)
             fit = None if patch is None else fit_disc(patch, look, guess, **how)
             if patch is not None and fit is not None:

@@ -169,9 +169,10 @@ class Known:
             return guess, self._patch(batch[i], look, guess)
 
         some = dict(list(points.items())[:: max(1, len(points) // _SAMPLES)])
-        clear = [fit for fit in fit_each(show, some, look).values() if is_clear(fit)]
-        if len(clear) == len(some) and len(points) > 0.97 * len(batch):
-            return before
+        if len(points) > 0.97 * len(batch):
+            for far in (False, True):
+                if sum(map(is_clear, fit_each(show, some, look, far).values())) == len(some):
+                    return before
         for _ in range(2):  # what stands before it spoils the points by which it is found
             fits = fit_each(show, places, look)
             rhythm = Rhythm.through(t_s, fits, self.swing.period_s) if len(fits) >= _ENOUGH else None

@@ -156,7 +156,7 @@ def _exposure(seen: Sightings, look: Look, fast: np.ndarray, interval_s: float, 
     cost = np.full((trials.size, fast.size), np.nan)
     centres: dict[int, tuple[float, float]] = {}
     tried: set[int] = set()
-    wanted = {0, 3, 6, 9} if about_s is None else {round(10 * about_s / interval_s)}
+    wanted = {0, 3, 6} if about_s is None else {round(10 * about_s / interval_s)}
     while wanted - tried:  # until what is best has no untried neighbour
         for j in sorted(wanted - tried):
             for n, k in enumerate(fast):

@@ -93,7 +93,7 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 24) ->
     if len(samples) < 3:
         return []
     spread = np.ptp(samples, axis=0) if len(samples) < 5 else _scatter(samples)
-    noise = float(np.median(spread))
+    noise = float(np.median(spread[::2, ::2]))
     moving = cv2.dilate((spread > max(4 * noise, 2.0)).astype(np.uint8), np.ones((3, 3), np.uint8))
     if not moving.any():
         return []
@@ -109,7 +109,8 @@ def find_round_movers(samples: list[np.ndarray], factor: int, most: int = 24) ->
             continue
         if edges.shape[1] > 4000:
             edges = np.take(edges, np.argpartition(edges[4], -4000)[-4000:], axis=1)
-        edges[4] = np.sqrt(edges[4] / np.percentile(edges[4], 90)).clip(0, 1)
+        strong = np.partition(edges[4], edges.shape[1] * 9 // 10)[edges.shape[1] * 9 // 10]
+        edges[4] = np.minimum(np.sqrt(edges[4] / strong), 1.0)
         for (reach, _), both in zip(reaches.tolist(), _vote(edges, reaches, picture.shape, table).tolist()):
             radius, sign = abs(reach), 1 if reach > 0 else -1
             for x, y, votes in both:

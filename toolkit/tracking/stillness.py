@@ -56,12 +56,11 @@ class Anchors:
         points = np.zeros((0, 2)) if corners is None else (corners.reshape(-1, 2) + 0.5) * factor - 0.5
         noise = 1.0 + _pixel_noise(luma)
         points = np.round(points).astype(np.int64)
-        windows = [_window(luma, x, y) for x, y in points.tolist()]
-        good = [k for k, window in enumerate(windows) if _place_sigma(window, noise) < _WORST_SIGMA_PX]
-        self.points = points[good]
-        self.windows = np.zeros((len(good), 2 * _HALF + 1, 2 * _HALF + 1), np.float32)
-        for k, which in enumerate(good):
-            self.windows[k] = windows[which]
+        windows = np.zeros((len(points), 2 * _HALF + 1, 2 * _HALF + 1), np.float32)
+        for window, (x, y) in zip(windows, points.tolist()):
+            window[:] = _window(luma, x, y)
+        good = _place_sigma(windows, noise) < _WORST_SIGMA_PX
+        self.points, self.windows = points[good], windows[good]
         self.centre = (luma.shape[1] / 2, luma.shape[0] / 2)
         self._last = np.zeros((len(self.points), 2))
         self._found = np.zeros(len(self.points))  # on how many pictures each window was
@@ -144,8 +143,9 @@ def _window(luma: np.ndarray, x: int, y: int) -> np.ndarray:
     return cv2.GaussianBlur(some, (2 * _BLUR + 1,) * 2, 1.0)[_BLUR:-_BLUR, _BLUR:-_BLUR]
 
 
-def _place_sigma(window: np.ndarray, noise: float) -> float:
-    """How well noise lets the window be placed, px, along its worse direction."""
-    gy, gx = np.gradient(window.astype(float))
-    normal = np.array([[np.sum(gx * gx), np.sum(gx * gy)], [np.sum(gx * gy), np.sum(gy * gy)]])
-    return noise / float(np.sqrt(max(np.linalg.eigvalsh(normal)[0], 1e-9)))
+def _place_sigma(windows: np.ndarray, noise: float) -> np.ndarray:
+    """How well noise lets each of the windows be placed, px, along its worse direction."""
+    gy, gx = np.gradient(windows, axis=(1, 2))
+    xx, xy, yy = (np.einsum("kij,kij->k", a, b) for a, b in ((gx, gx), (gx, gy), (gy, gy)))
+    least = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)  # eigenvalue of [[xx, xy], [xy, yy]]
+    return np.asarray(noise / np.sqrt(np.maximum(least, 1e-9)))
