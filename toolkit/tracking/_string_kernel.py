@@ -18,18 +18,19 @@ STRIPS, STRIP, SLOPES = 24, 65, 26  # sections and their pixels for the first lo
 SECTIONS, HALF, ENDS = 100, 5, 8  # sections at most; pixels to either side that the ridge, and its section, reach
 WIDTH2 = 1.5 * 1.5  # the ridge's variance, px²
 _WIDE = 2 * HALF + 1
+DIGITS = 20  # of a place's fraction
+FINE = 2**DIGITS
 SPARE = max(STRIPS * STRIP, SECTIONS * _WIDE) + 2 * _WIDE + 2 * ENDS
 
 
 @part
-def brightness(picture: Any, down: int, right: int, x: float, y: float) -> float:
-    """The picture between its pixels."""
-    ix, iy = int(x), int(y)
-    fx, fy = x - ix, y - iy
-    at = skip(picture, iy * down + ix * right)
-    top = at[0] * (1.0 - fx) + at[right] * fx
-    bottom = at[down] * (1.0 - fx) + at[down + right] * fx
-    return top * (1.0 - fy) + bottom * fy
+def brightness(picture: Any, down: int, right: int, x: int, y: int) -> float:
+    """The picture between its pixels, at a place in units of 1/FINE px: in whole numbers it is quicker to find."""
+    at = skip(picture, (y >> DIGITS) * down + (x >> DIGITS) * right)
+    fx, fy = x & (FINE - 1), y & (FINE - 1)
+    first, second, third, fourth = int(at[0]), int(at[right]), int(at[down]), int(at[down + right])
+    top, bottom = first * FINE + (second - first) * fx, third * FINE + (fourth - third) * fx
+    return (top * FINE + (bottom - top) * fy) * (1.0 / (FINE * FINE))
 
 
 @part
@@ -37,12 +38,16 @@ def clearest(places: Any, strips: Any, bx: float, by: float, ux: float, uy: floa
     """The slope against the pivot's direction at which the line from the bob is most unlike both its sides; 0 unless it is
     clearer by far than what lies straight ahead."""
     middle, picture, down, right = STRIP // 2, greys(places, PICTURE), places[DOWN], places[RIGHT]
+    step_x, step_y = int(ux * FINE), int(uy * FINE)
+    last_x, last_y = (places[COLUMNS] - 1) * FINE, (places[ROWS] - 1) * FINE
     for k in range(STRIPS):
         along = start + (k + 0.5) * (far - start) / STRIPS
+        x, y = int((bx + ux * along + uy * middle) * FINE), int((by + uy * along - ux * middle) * FINE)
         for j in range(STRIP):
-            x, y = bx + ux * along - uy * (j - middle), by + uy * along + ux * (j - middle)
-            inside = x >= 0.0 and y >= 0.0 and x < places[COLUMNS] - 1 and y < places[ROWS] - 1
+            inside = x >= 0 and y >= 0 and x < last_x and y < last_y
             strips[k * STRIP + j] = brightness(picture, down, right, x, y) if inside else math.nan
+            x -= step_y
+            y += step_x
     plain = best = slope = 0.0
     for i in range(-SLOPES, SLOPES + 1):
         sum1 = sum2 = 0.0
@@ -77,6 +82,7 @@ def ridge(places: Any) -> None:
     if not length >= 2.0 * radius + 20.0:
         return
     ux, uy = ux / length, uy / length
+    step_x, step_y = int(ux * FINE), int(uy * FINE)
     square = 0.0
     for j in range(_WIDE):
         shape[j] = math.exp(-(j - HALF) * (j - HALF) / (2.0 * WIDTH2))
@@ -109,8 +115,11 @@ def ridge(places: Any) -> None:
                     continue
                 if (y if y < ey else ey) < 0.0 or (y if y > ey else ey) >= places[ROWS] - 1:
                     continue
+                at_x, at_y = int(x * FINE), int(y * FINE)
                 for j in range(2 * ENDS + 1):
-                    profile[j] = brightness(picture, down, right, x - uy * j, y + ux * j)
+                    profile[j] = brightness(picture, down, right, at_x, at_y)
+                    at_x -= step_y
+                    at_y += step_x
                 level = tilt = 0.0
                 for j in range(3):
                     level += (profile[j] + profile[2 * ENDS - j]) / 6.0

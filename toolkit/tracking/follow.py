@@ -10,11 +10,12 @@ import numpy as np
 
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
-from toolkit.tracking.front import ROUND, WITHIN, enough_shows, hidden_share
+from toolkit.tracking.front import WITHIN, enough_shows, hidden_share
 from toolkit.tracking.learn import Known
 from toolkit.tracking.looks import light_on
 from toolkit.tracking.repeat import alike, thinned
 from toolkit.tracking.search import find_round_near, silhouette
+from toolkit.tracking.spots import level_around, tell_bob
 from toolkit.tracking.stillness import CameraShift
 from toolkit.tracking.string_line import measure_string
 from toolkit.tracking.swing import CALM, fit_swing, start_swing
@@ -203,8 +204,7 @@ class Follower(Known):
         """How bright the light on the bob is against that when the background was learned: by the wall beside it."""
         if not isfinite(place.wall):
             return 1.0
-        around = _back_at(patch, place, self.look.radius_px + 2 * self.look.edge_px, ROUND)
-        level = float(around.mean()) if around.size else 0.0
+        level = level_around(patch, place.x_px, place.y_px, self.look.radius_px + 2 * self.look.edge_px)
         return min(max(place.wall / level, 0.3), 3.0) if level > 1 else 1.0
 
     def _shade_now(self, light: float, place: Place) -> float:
@@ -268,20 +268,13 @@ class Follower(Known):
         shade, radius = self._shade, self.look_at(Guess(place.x_px, place.y_px)).radius_px
         if isnan(shade) or not isfinite(place.wall):
             return True
-        still = patch._replace(back=self.back.mean, x_px=0.0, y_px=0.0)  # without the bob's own shadow
-        light = (place.contrast + place.wall) / self._shade_seen
-        shown = _back_at(patch._replace(back=patch.image), place, radius, WITHIN) / max(light, 0.1)
-        behind = _back_at(still, place, radius, WITHIN)
-        if behind.size != shown.size:
-            return True  # at the picture's rim
-        if self.front is not None:
-            clear = ~_back_at(still._replace(back=self.front), place, radius, WITHIN)
-            shown, behind = shown[clear], behind[clear]
-        if behind.size < 8:
+        light = max((place.contrast + place.wall) / self._shade_seen, 0.1)
+        least = 2 * self.look.noise + 0.05 * abs(self.look.contrast)
+        disc = place.x_px, place.y_px, radius
+        told = tell_bob(patch, self.back.mean, self.front, disc, shade, light, least)  # without the bob's own shadow
+        if told is None or told.seen < 8:  # at the picture's rim
             return True
-        tells = np.abs(behind - shade) > 2 * self.look.noise + 0.05 * abs(self.look.contrast)
-        bob = tells & (np.abs(shown - shade) < np.abs(shown - behind))
-        return bool(tells.mean() > 0.65 and bob.sum() > 0.75 * tells.sum())
+        return told.tells > 0.65 * told.seen and told.bobs > 0.75 * told.tells
 
     def _unlike(self, patch: Patch, place: Place) -> float:
         """How much of a bob with a pattern differs from what stands still where it is."""
