@@ -63,6 +63,15 @@ def test_a_shadow_that_the_rim_of_the_picture_cuts_is_found():
     assert np.hypot(found.x_px, found.y_px) < 0.1
 
 
+def test_a_shadow_is_found_in_a_light_that_changes():
+    shadow = (-7.0, 8.0, 12.0, 4.0, 0.45)
+    lit = [(p._replace(image=p.image * light), g) for light, (p, g) in zip(np.linspace(0.8, 1.2, 8), seen(shadow))]
+    found = find_shadow(lit, Look(13.5, 2.5, -90.0, 10.0))
+    assert found is not None
+    assert np.all(np.abs(np.subtract(found.shadow, shadow)) < [0.5, 0.5, 0.5, 0.5, 0.03])
+    assert np.hypot(found.x_px, found.y_px) < 0.1
+
+
 def test_no_shadow_is_found_where_there_is_none():
     assert find_shadow(seen(None), Look(12.0, 0.7, -100.0, 2.0)) is None
     assert find_shadow(seen(None), Look(12.0, 0.7, -100.0, 30.0)) is None

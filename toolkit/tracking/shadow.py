@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.trackers.localiser import Guess, Look, Patch
 from toolkit.tracking.least_squares import least_squares
+from toolkit.tracking.search import rim_level
 
 _PIXELS = 3000  # so many are compared with the model
 _CLEAR = 8.0  # grey levels: what the model leaves counts less where it is more
@@ -188,8 +189,8 @@ def _beside_patterned(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.
 def _pixels(
     seen: list[tuple[Patch, Guess]], look: Look
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Some pixels of the patches but for the string: places relative to the guess, picture, background, and whether that was
-    seen there."""
+    """Some pixels of the patches but for the string: places relative to the guess, picture in the background's light, background,
+    and whether that was seen there."""
     bare = []
     for patch, guess in seen:
         rows, columns = np.ogrid[: patch.image.shape[0], : patch.image.shape[1]]
@@ -204,7 +205,8 @@ def _pixels(
         rows, columns = places[-passed % every :: every].T
         passed += len(places)
         u, v = columns + patch.x_px - guess.x_px, rows + patch.y_px - guess.y_px
-        taken.append(np.array([u, v, *(picture[rows, columns] for picture in (patch.image, patch.back, patch.seen))]))
+        evened = patch.image * (rim_level(patch.back) / max(rim_level(patch.image), 1.0))
+        taken.append(np.array([u, v, *(picture[rows, columns] for picture in (evened, patch.back, patch.seen))]))
     u, v, image, back, times = np.concatenate(taken, axis=1)
     return u, v, image, back, times > 0
 

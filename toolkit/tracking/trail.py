@@ -69,7 +69,8 @@ class Trail:
             return None
         size, edge, contrast, noise = (float(np.median([k[n] for k in self.looks])) for n in range(4))
         quality = abs(contrast) / (noise + 1.0)
-        extent = float(np.hypot(*np.ptp(list(self.points.values()), axis=0)))
+        # on most frames: a string that passes before what stands still moves it about on a few
+        extent = float(np.hypot(*np.ptp(np.percentile(list(self.points.values()), (10, 90), axis=0), axis=0)))
         size = radius or size
         moved = min(1.0, 0.25 * extent / size)  # what stands still on a wall that shakes explains little change
         share = len(self.points) / len(self.batch)
