@@ -68,7 +68,8 @@ def _likeliest(
     repeated: frozenset[int],
     stage: Stage | None = None,
 ) -> Rough | None:
-    """The hypothesis that, followed, swings best. What was followed once is not followed again."""
+    """The hypothesis that, followed, swings best. What was followed once is not followed again, nor what looks so poor that it
+    could neither be better than the best nor the bob of which that is the shadow."""
     roughs: list[Rough] = []
     trails: list[Trail] = []
     for sight, h in candidates:
@@ -80,8 +81,10 @@ def _likeliest(
         trail = begin_trail(batch, start, h, sight, radius, repeated, stage)
         if trail is None:
             continue
+        known = any(other.meets(trail) for other in trails)
         trails.append(trail)
-        rough = trail.follow(radius)
+        enough = _SHADOWED * max((rough.score for rough in roughs), default=0.0)
+        rough = None if known or trail.hope < enough else trail.follow(radius)
         if rough is not None:
             roughs.append(rough)
     best = max(roughs, key=lambda rough: rough.score, default=None)

@@ -59,6 +59,22 @@ class Trail:
             and h.radius_px < 1.5 * self.look.radius_px
         )
 
+    def meets(self, other: Trail) -> bool:
+        """Does the other one begin on what was followed here, and does it look the same?"""
+        (start, (x, y)), look = next(iter(other.points.items())), other.look
+        place = self.points.get(start)
+        return (
+            place is not None
+            and hypot(place[0] - x, place[1] - y) < 0.2 * self.look.radius_px
+            and 0.9 < look.radius_px / self.look.radius_px < 1.1
+            and 0.8 < look.contrast / self.look.contrast < 1.25
+        )
+
+    @property
+    def hope(self) -> float:
+        """The score that it may have, followed, if it looks everywhere as it did where it was seen first."""
+        return _score(self.look, 0.0)
+
     def follow(self, radius: float | None) -> Rough | None:
         """Through all frames, from the first point on; None unless it swings. `radius` if it is known, px."""
         start = next(iter(self.points))
@@ -68,13 +84,12 @@ class Trail:
         if swing is None or len(self.points) < max(12, 0.3 * len(self.batch)):
             return None
         size, edge, contrast, noise = (float(np.median([k[n] for k in self.looks])) for n in range(4))
-        quality = abs(contrast) / (noise + 1.0)
         # on most frames: a string that passes before what stands still moves it about on a few
         extent = float(np.hypot(*np.ptp(np.percentile(list(self.points.values()), (10, 90), axis=0), axis=0)))
         size = radius or size
         moved = min(1.0, 0.25 * extent / size)  # what stands still on a wall that shakes explains little change
         share = len(self.points) / len(self.batch)
-        score = share**2 * quality * moved * size**0.5 / (0.3 + swing.rms_px)
+        score = share**2 * moved * _score(Look(size, edge, contrast, noise), swing.rms_px)
         if self.stage is not None and self.stage.silhouette:
             contrast = _contrast(self.batch, self.points, size, self.stage.still)
         points = {i: self.points[i] for i in sorted(self.points)}
@@ -162,6 +177,11 @@ class Trail:
         if found is None or found[2] < 0.5:
             return False
         return self._take(i, Guess(found[0] + patch.x_px, found[1] + patch.y_px))
+
+
+def _score(look: Look, rms_px: float) -> float:
+    """How clear, large and calm a thing is that moves far and is seen on all frames."""
+    return abs(look.contrast) / (look.noise + 1.0) * look.radius_px**0.5 / (0.3 + rms_px)
 
 
 def begin_trail(
