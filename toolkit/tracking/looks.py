@@ -30,12 +30,9 @@ class Sightings:
         """The disc fitted to sighting k, its centre in pixels of the picture; None where there is none."""
         return self._fit(k, look, (float(self.x_px[k]), float(self.y_px[k])), streak_s, how)
 
-    def fit_from_far(
-        self, k: int, look: Look, streak_s: float, near: tuple[float, float] | None = None
-    ) -> np.ndarray | None:
-        """`fit`, from `near` if that is known; and where this sees no outline, once more from where a soft edge, which reaches
-        farther, finds it."""
-        out = self._fit(k, look, near or (float(self.x_px[k]), float(self.y_px[k])), streak_s, {"turns": 6})
+    def fit_from_far(self, k: int, look: Look, streak_s: float) -> np.ndarray | None:
+        """`fit`; and where this sees no outline, once more from where a soft edge, which reaches farther, finds it."""
+        out = self.fit(k, look, streak_s, turns=6)
         if out is not None and out[_VISIBLE] > 0.5:
             return out
         soft = self.fit(k, look._replace(noise=np.inf), streak_s, turns=12, soften=2.5)
@@ -154,16 +151,14 @@ def _exposure(seen: Sightings, look: Look, fast: np.ndarray, interval_s: float, 
     """
     trials = np.linspace(0, 1, 11)
     cost = np.full((trials.size, fast.size), np.nan)
-    centres: dict[int, tuple[float, float]] = {}
     tried: set[int] = set()
     wanted = {0, 3, 6} if about_s is None else {round(10 * about_s / interval_s)}
     while wanted - tried:  # until what is best has no untried neighbour
         for j in sorted(wanted - tried):
             for n, k in enumerate(fast):
-                fit = seen.fit_from_far(k, look, trials[j] * interval_s, centres.get(n))
+                fit = seen.fit_from_far(k, look, trials[j] * interval_s)
                 if fit is not None and fit[_VISIBLE] > 0.5:
                     cost[j, n] = fit[_MISFIT] ** 2
-                    centres[n] = float(fit[0]), float(fit[1])
         tried |= wanted
         total = _total(cost, 1)
         if total is None:
