@@ -40,12 +40,14 @@ def least_squares(
     *,
     turns: int = 25,
     settled: float = 1e-7,
+    little: float = 0.0,
     slopes: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Minimum | None:
     """Minimise |rest(values)|² over values[free] from `start`; `steps` are the differences' steps, one a value.
 
     `slopes` gives d rest / d values[free] where that is to be had more cheaply than by differences of `rest`.
-    Ends after `turns` or where a step gains less than the fraction `settled`. None where numbers are not finite.
+    Ends after `turns` or where a step gains less than the fraction `settled`, or less than `little`. None where numbers are not
+    finite.
     """
     index = list(free)
     values = np.array(start, float)
@@ -75,7 +77,7 @@ def least_squares(
             trial = values.copy()
             try:
                 step = -np.linalg.solve(damped, pull)
-                if -(step @ (2 * pull + normal @ step)) <= _HOPELESS * settled * cost:
+                if -(step @ (2 * pull + normal @ step)) <= _HOPELESS * max(settled * cost, little):
                     done = True
                     break
                 if (size := float(step @ (diagonal * step))) > _STRAIGHT * cost:
@@ -91,7 +93,7 @@ def least_squares(
             after = rest(trial)
             trial_cost = float(after @ after)
             if np.isfinite(trial_cost) and trial_cost <= cost:
-                done = cost - trial_cost <= settled * cost
+                done = cost - trial_cost <= max(settled * cost, little)
                 values, now, cost = trial, after, trial_cost
                 damping = max(damping / 10, 1e-12)
                 break

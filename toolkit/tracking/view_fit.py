@@ -270,19 +270,28 @@ class _Problem:
         """Let all data weigh as their residuals say."""
         self.numbers[2] = inflation
 
-    def solve(self, start: np.ndarray, names: tuple[str, ...], turns: int) -> Minimum | None:
+    def solve(self, start: np.ndarray, names: tuple[str, ...], turns: int, little: float = 0.0) -> Minimum | None:
         values = start.copy()
         for name in NAMES[10:]:
             if name not in names and name != "log_nearness":
                 values[AT[name]] = 0.0
         index = [AT[n] for n in names]
         return least_squares(
-            self.rest, values, self.steps, index, turns=turns, settled=1e-5, slopes=lambda v: self.slopes(v, index)
+            self.rest,
+            values,
+            self.steps,
+            index,
+            turns=turns,
+            settled=1e-5,
+            little=little,
+            slopes=lambda v: self.slopes(v, index),
         )
 
     def modes(self, *starts: np.ndarray, deep: float = 30.0) -> list[Minimum]:
-        """The minima with every effect free to which these starts lead, the deepest first, up to `deep` above it in χ²."""
-        found = [m for m in (self.solve(s, NAMES, 10) for s in starts) if m is not None]
+        """The minima with every effect free to which these starts lead, the deepest first, up to `deep` above it in χ²; with no
+        such limit about where they are: those that count are gone to once it is known how little the data weigh."""
+        little = 0.03 * self.least_inflation**2 if deep == np.inf else 0.0
+        found = [m for m in (self.solve(s, NAMES, 10, little) for s in starts) if m is not None]
         apart: list[Minimum] = []
         for mode in sorted(found, key=lambda m: m.chi2):
             near = any((mode.values - m.values) @ m.normal @ (mode.values - m.values) < 4.0 for m in apart)

@@ -40,8 +40,8 @@ def _grown(values: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, chos
     while True:
         part = chosen[t[chosen] <= stop]
         if part.size >= 12:
-            p = part[:: max(1, part.size // 1500)]
-            calm = CALM if stop < t[-1] else None
+            calm, most = (CALM, 150) if stop < t[-1] else (None, 1500)
+            p = part[:: max(1, part.size // most)]
             # damping seen over a second or so may be none, and leads nowhere later
             undamped = np.where([name in CALM for name in NAMES], 0.0, values)
             for start, prior in ((values, calm), (values, CALM), (undamped, CALM)):
