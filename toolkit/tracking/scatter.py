@@ -111,13 +111,12 @@ def quick_scatter(t_s: np.ndarray, r: np.ndarray, s: np.ndarray) -> np.ndarray:
     for degree in (2, 4, 6, 8):
         if t_s.size < 4 * degree:
             break
-        t, near_r, near_s = (np.lib.stride_tricks.sliding_window_view(a, degree + 1, axis=-1) for a in (t_s, r, s))
-        apart = np.ones(t.shape)
-        for k in range(degree + 1):
-            factor = (t - t[:, [k]]) / np.ptp(t, axis=1)[:, None]
-            factor[:, k] = 1.0
-            apart *= factor
-        differences = np.sum(near_r / apart, axis=-1) / np.sqrt(np.sum((near_s / apart) ** 2, axis=-1))
+        ends = [slice(k, t_s.size - degree + k) for k in range(degree + 1)]
+        top = bottom = np.zeros(1)
+        for k in ends:
+            apart = np.prod([t_s[k] - t_s[j] for j in ends if j != k], axis=0)
+            top, bottom = top + r[..., k] / apart, bottom + (s[..., k] / apart) ** 2
+        differences = top / np.sqrt(bottom)
         found.append(np.sqrt(np.mean(differences**2, axis=-1)))
     if not found:
         return np.asarray(np.sqrt(np.mean((r / s) ** 2, axis=-1)))
