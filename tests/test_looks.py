@@ -11,7 +11,7 @@ from test_track import H, W, film
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Guess, Look, Patch
 from toolkit.tracking.learn import _by_speed
-from toolkit.tracking.looks import Sightings, learn_looks
+from toolkit.tracking.looks import Sightings, _nears, learn_looks
 from toolkit.tracking.stillness import Anchors
 
 pytest.importorskip("av")
@@ -118,3 +118,12 @@ def test_a_dark_thing_behind_the_bob_in_fading_light_hides_no_frame(tmp_path):
     found = track(film(tmp_path / "behind.mp4", frames))
     assert (found.status == OK).mean() > 0.93
     assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 1.0
+
+
+@pytest.mark.parametrize(("nearing", "larger"), [(8e-4, True), (0.0, False), (1e-4, False)])
+def test_a_bob_that_nears_the_camera_on_its_way_is_larger_than_on_its_way_back(nearing, larger):
+    """Seen where it turns, at either end; its size grows with speed too where blur widens it, which tells nothing."""
+    vx = np.concatenate([np.linspace(-250, 250, 8), np.linspace(250, -250, 8)])
+    x = np.repeat([40.0, 600.0], 8)
+    sizes = 17 + nearing * vx + 2e-4 * np.abs(vx) + np.random.default_rng(6).normal(0, 0.03, 16)
+    assert _nears(sizes, x, vx, 2800.0) is larger

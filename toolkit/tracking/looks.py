@@ -11,6 +11,8 @@ import numpy as np
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
 
+_SURE, _GROWN_PX = 6.0, 0.4  # standard deviations, and over the whole swing: so much the bob grows where it nears
+_MANY = 4000  # pixels of a patch: a part of more tells its light as well
 # what `fit_disc` gives
 _RADIUS, _EDGE, _MISFIT, _VISIBLE, _CONTRAST, _WITHIN = 2, 3, 7, 8, 9, 13
 
@@ -70,7 +72,7 @@ def learn_looks(
     speed = np.hypot(seen.vx, seen.vy)
     slow = _slow(seen, speed, look.radius_px, shape)
     fast = np.argsort(-speed)[:10]
-    walls = [w for w in (seen.noise(k, look) for k in slow) if np.isfinite(w)]
+    walls = [w for w in (seen.noise(k, look) for k in slow[::2]) if np.isfinite(w)]
     drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(walls or [0.0]))  # more misfit than noise leaves
     found_px, learned = look.radius_px, Looks(look)
 
@@ -88,7 +90,7 @@ def learn_looks(
         if len(fits) < 3 and turn == 0:
             return None
         if len(fits) >= 3:
-            look, growth = _size(look, fits, seen.x_px, radius)
+            look, growth = _size(look, fits, seen, radius)
             learned = Looks(look, learned.exposure_s, growth)
         if not look.even and look.noise > drawn:
             return Looks(look._replace(radius_free=False))  # a pattern up to the outline: it tells no size, no streak
@@ -123,9 +125,10 @@ def _whole(fit: np.ndarray, found_px: float, shape: tuple[int, ...]) -> bool:
 
 
 def _size(
-    look: Look, fits: dict[int, np.ndarray], x_px: np.ndarray, radius: float | None
+    look: Look, fits: dict[int, np.ndarray], seen: Sightings, radius: float | None
 ) -> tuple[Look, tuple[float, float] | None]:
     """The looks that most fits agree on; and the line along which the radius grows, where the bob is larger on one side."""
+    x_px = seen.x_px
     usual = sorted(f[_CONTRAST] for f in fits.values())[len(fits) // 2]
     fits = {k: f for k, f in fits.items() if 0.5 < f[_CONTRAST] / usual < 2.0}  # the others ran away
     table = np.array(list(fits.values()))
@@ -138,9 +141,20 @@ def _size(
         return look._replace(radius_free=False), None
     spread = np.hypot(sizes[left].std() / np.sqrt(left.sum()), sizes[~left].std() / np.sqrt((~left).sum()))
     if abs(sizes[left].mean() - sizes[~left].mean()) <= max(0.05, 4 * spread):
-        return look._replace(radius_free=False), None
+        return look._replace(radius_free=_nears(sizes, where, seen.vx[list(fits)], float(np.ptp(seen.vx)))), None
     slope, intercept = np.polyfit(where, sizes, 1)
     return look._replace(radius_free=True), (float(slope), float(intercept))
+
+
+def _nears(sizes: np.ndarray, x_px: np.ndarray, vx: np.ndarray, range_vx: float) -> bool:
+    """Is the bob larger on its way to one side than on its way back? So it is where it swings in an ellipse: then it is nearest, and
+    farthest, where it is fastest. All (n,), of sightings on which it is slow."""
+    design = np.column_stack([np.ones_like(vx), x_px - x_px.mean(), vx])
+    values, rest, rank, _ = np.linalg.lstsq(design, sizes, rcond=None)
+    if rank < 3 or sizes.size < 8:
+        return False
+    sigma = float(np.sqrt(rest[0] / (sizes.size - 3) * np.linalg.inv(design.T @ design)[2, 2]))
+    return bool(abs(values[2]) > _SURE * sigma and abs(values[2]) * range_vx > _GROWN_PX)
 
 
 def _exposure(seen: Sightings, look: Look, fast: np.ndarray, interval_s: float, about_s: float | None) -> float | None:
@@ -191,7 +205,9 @@ def _total(cost: np.ndarray, least: int) -> np.ndarray | None:
 
 def light_on(patch: Patch) -> float:
     """How bright the light is against that of the background."""
-    known = patch.seen > 0
+    every = 1 + patch.image.size // _MANY
+    image, back, seen = (p.ravel()[::every] for p in (patch.image, patch.back, patch.seen))
+    known = seen > 0
     if np.count_nonzero(known) < 20:
         return 1.0
-    return float(np.clip(np.median(patch.image[known] / np.maximum(patch.back[known], 1.0)), 0.3, 3.0))
+    return float(np.clip(np.median(image[known] / np.maximum(back[known], 1.0)), 0.3, 3.0))
