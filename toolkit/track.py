@@ -19,6 +19,7 @@ from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
 from toolkit.tracking.clock import even_times, late_told, lone_strays, out_of_time, slips_told, strays_told, timed_swing
 from toolkit.tracking.follow import Follower, Record
+from toolkit.tracking.held import held_swing
 from toolkit.tracking.joint import Camera, fit_jointly
 from toolkit.tracking.outline import pulled_by_lens
 from toolkit.tracking.places import Places
@@ -235,6 +236,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     places, swing = timed_swing(followed, places, video.path, warnings)
     if shake.taken:
         places, swing = shake.checked(places, swing)
+    swing = held_swing(swing, places, _strings(record, places, shake, look.radius_px, fps_factor).seen(), size_px)
     require_pendulum(swing, places, size_px, video.path)
     found, none = places, np.zeros(places.t_s.size, bool)
     untimely, stray = _out_of_step(found, swing, swing.position(places.t_s), none)

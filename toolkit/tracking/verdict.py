@@ -18,7 +18,7 @@ _STRAYS_PX = 0.1  # less does not stray, whatever its error bar
 _STRAYS = 0.04  # of the bob's radius: more does
 _ROLLS = 0.1  # of the bob's radius: what strays less may be the roll of a camera that a hand is known to hold
 _ENDLESS = 20  # so many times longer than the clip, half a period is no swing
-_STRAIGHT = 20  # diagonals of the picture: a pivot farther off is none
+STRAIGHT = 20  # diagonals of the picture: a pivot farther off is none
 _STRETCH = 3.0  # periods
 _UNEVEN_PX = 0.15  # by so much the places of an uneven bob may stray, unmentioned
 
@@ -36,7 +36,7 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
         reasons.append("nothing pulls it back")
     if span <= half / _ENDLESS or not 0 < amplitude < np.pi:
         reasons.append("it does not turn back")
-    straight = swing.length_px > _STRAIGHT * np.hypot(*size_px)
+    straight = swing.length_px > STRAIGHT * np.hypot(*size_px)
     shaky = 0.06 if good.mean() > 0.95 else 0.04  # a hand-held camera before a plain wall: told as a warning
     strays = swing.rms_px > max(shaky * extent, 0.3)
     seldom = good.mean() < 0.6 and swing.rms_px > 0.015 * extent
