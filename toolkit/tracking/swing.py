@@ -159,19 +159,19 @@ def fit_swing(
         return np.concatenate([(x - x_px) * weight, (y - y_px) * weight, pulls])
 
     def slopes(values: np.ndarray) -> np.ndarray:
-        moved = values + np.eye(9)[index] * steps
-        moving = [row for row, i in enumerate(index) if i >= 4]  # the angle does not depend on the rest
-        angles = solve_swing(np.array([values, *moved[moving]]), np.tile(t, (len(moving) + 1, 1)))[:, 0]
-        theta = np.tile(angles[0], (len(index), 1))
-        theta[moving] = angles[1:]
-        (x, y), (x0, y0) = _place(moved.T[..., None], theta), _place(values, angles[0])
-        pulls = [(moved[:, i] - values[i]) / sigma for i, (_, sigma) in tied.items()]
-        return (
-            np.concatenate([(x - x0) * weight, (y - y0) * weight, np.reshape(pulls, (-1, len(index))).T], axis=1)
-            / steps[index][:, None]
-        ).T
+        sets = values + np.concatenate([np.zeros((1, 9)), np.eye(9)[moving] * steps])
+        angles = solve_swing(sets, np.tile(t, (len(sets), 1)))[:, 0]
+        turns = np.zeros((9, t.size))  # by each of the values, of the direction
+        turns[3] = 1.0
+        turns[moving] = (angles[1:] - angles[0]) / steps[moving][:, None]
+        right, down = values[2] * np.sin(angles[0] + values[3]), values[2] * np.cos(angles[0] + values[3])
+        along_x, along_y = turns * down, turns * -right
+        along_x[0], along_y[1], along_x[2], along_y[2] = 1.0, 1.0, right / values[2], down / values[2]
+        pulls = [np.eye(9)[i] / sigma for i, (_, sigma) in tied.items()]
+        found = [along_x * weight, along_y * weight, np.reshape(pulls, (-1, 9)).T]
+        return np.concatenate(found, axis=1)[index].T
 
-    steps = small_steps(start)
+    steps, moving = small_steps(start), [i for i in index if i >= 4]  # the angle does not depend on the rest
     least = least_squares(rest, start, steps, index, turns=turns, slopes=slopes)
     if least is None:
         return None
