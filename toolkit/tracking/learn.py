@@ -16,7 +16,7 @@ from toolkit.tracking.front import EVEN, Rhythm, find_front, fit_each, is_clear,
 from toolkit.tracking.looks import Looks, Sightings, learn_looks
 from toolkit.tracking.search import still_picture
 from toolkit.tracking.shadow import Shaded, Shadow, find_shadow
-from toolkit.tracking.sight import LUMA, Sight
+from toolkit.tracking.sight import LUMA, Sight, maybe_shadow
 from toolkit.tracking.stillness import STILL, Anchors, CameraShift
 from toolkit.tracking.swing import CALM, Swing, fit_swing
 from toolkit.tracking.trail import Rough, cut
@@ -131,7 +131,7 @@ class Known:
         grow = 3 * look.radius_px + 20
         x0, y0 = max(0, int(xs.min() - grow)), max(0, int(ys.min() - grow))
         x1, y1 = min(self.shape[1], int(xs.max() + grow)), min(self.shape[0], int(ys.max() + grow))
-        every = max(1, len(batch) // 40)
+        every = max(1, round(len(batch) / 40))
         pivot = self.pivot or self.swing.pivot_px
         some = {i: place for i, place in points.items() if i % every == 0}
         shifts = [(round(dx), round(dy)) for dx, dy in (self._camera(batch[i]).at(*some[i]) for i in some)]
@@ -208,7 +208,7 @@ class Known:
         shaded = self._learn_shadow(batch, alone.look, points)
         if shaded is None or not (shaded.taken_for_bob or self.sight.weights == LUMA):
             return alone, points
-        sight, self.sight, self.shadow = self.sight, Sight(LUMA), shaded.shadow
+        before, sight, self.sight, self.shadow = self.back, self.sight, Sight(LUMA), shaded.shadow
         without = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
         bare = Look(radius or shaded.radius_px, shaded.edge_px, shaded.contrast, alone.look.noise)
         self._learn_background(batch, bare, without)
@@ -217,28 +217,30 @@ class Known:
         if shaded.taken_for_bob or looks.look.noise < less * alone.look.noise:
             return looks, without
         self.sight, self.shadow = sight, None  # a bob with a pattern, or drawn out by the lens, but no shadow
-        self._learn_background(batch, look, points)
+        self.back = before
         return alone, points
 
     def _learn_shadow(self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]]) -> Shaded | None:
         """The shadow beside a bob of about this look, from the frames on which it is slow."""
-        sight, self.sight = self.sight, Sight(LUMA)  # in a colour difference a shadow hardly shows
-        if sight != self.sight:
-            look = look._replace(contrast=0.0, noise=np.inf)
-            self._learn_background(batch, look, points)
         numbers = np.array(list(points))
         speed = np.hypot(*self.swing.velocity(np.array([batch[i].t_s for i in numbers])))
         slow = numbers[np.argsort(speed)[: max(10, numbers.size // 3)]]
+        slow = slow[:: max(1, slow.size // 10)]
+        before, sight, self.sight = self.back, self.sight, Sight(LUMA)  # in a colour difference a shadow hardly shows
+        if sight != self.sight:
+            if not maybe_shadow([batch[i] for i in slow], [points[i] for i in slow], look.radius_px):
+                self.sight = sight
+                return None
+            look = look._replace(contrast=0.0, noise=np.inf)
+            self._learn_background(batch, look, points)
         half = (2.5 * look.radius_px + 12,) * 2
         seen = []
-        for i in slow[:: max(1, slow.size // 10)]:
+        for i in slow:
             guess = self._guess(*points[i], 0.0, 0.0)
             patch = self._patch(batch[i], look, guess, half)
             if patch is not None:
                 seen.append((patch, guess))
-        if sight != self.sight:
-            self.sight = sight
-            self._learn_background(batch, look, points)
+        self.back, self.sight = before, sight
         return find_shadow(seen, look)
 
     def _learn_looks(

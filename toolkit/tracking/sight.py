@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 from toolkit.video import Frame
 
 LUMA = (1.0, 0.0, 0.0)
+_COLOURS = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+_GREY = 6.0  # levels: by so much light of another colour may tinge a shadow
 
 
 @dataclass(frozen=True)
@@ -73,11 +76,12 @@ def small_planes(frame: Frame, factor: int, colour: bool) -> list[np.ndarray]:
     return [cv2.resize(np.ascontiguousarray(p), size, interpolation=cv2.INTER_AREA).astype(np.float32) for p in chroma]
 
 
-def best_sight(frames: list[Frame], places: list[tuple[float, float]], radius_px: float) -> Sight:
-    """The mix that separates bob from wall best: brightness if that is good, else Fisher's discriminant.
+Seen = Callable[[tuple[float, float, float]], tuple[np.ndarray, np.ndarray]]
 
-    frames and the bob's centre (x, y) in each; colour is only chosen where it gains much, for its planes are coarse.
-    """
+
+def _apart(frames: list[Frame], places: list[tuple[float, float]], radius_px: float) -> Seen | None:
+    """What gives the pixels of the bob and those of the wall about it, in the mix of planes asked for; None where it is nowhere
+    in the picture. frames and the bob's centre (x, y) in each."""
     views: list[tuple[Frame, tuple[int, int, int, int], np.ndarray]] = []
     half = int(1.7 * radius_px + 4)
     for frame, (x, y) in zip(frames, places):
@@ -89,12 +93,30 @@ def best_sight(frames: list[Frame], places: list[tuple[float, float]], radius_px
         views.append((frame, (x0, y0, x1, y1), np.hypot(columns - x, rows - y)))
 
     def seen(weights: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Bob and wall in one plane."""
         planes = [(Sight(weights).window(frame, *box).astype(float), d) for frame, box, d in views]
         bob = [plane[d < 0.8 * radius_px] for plane, d in planes]
         return np.concatenate(bob), np.concatenate([plane[d > 1.25 * radius_px + 2] for plane, d in planes])
 
-    if not views:
+    return seen if views else None
+
+
+def maybe_shadow(frames: list[Frame], places: list[tuple[float, float]], radius_px: float) -> bool:
+    """Could what is seen at these places (x, y) be a shadow: the wall in less light, but of its colour?"""
+    seen = _apart(frames, places, radius_px)
+    if seen is None:
+        return False
+    (bright, wall), *colours = (tuple(map(np.median, seen(plane))) for plane in (LUMA, *_COLOURS))
+    left = bright / max(wall, 1.0)
+    return bool(left < 1 and all(abs(c - 128 - left * (beside - 128)) < _GREY for c, beside in colours))
+
+
+def best_sight(frames: list[Frame], places: list[tuple[float, float]], radius_px: float) -> Sight:
+    """The mix that separates bob from wall best: brightness if that is good, else Fisher's discriminant.
+
+    frames and the bob's centre (x, y) in each; colour is only chosen where it gains much, for its planes are coarse.
+    """
+    seen = _apart(frames, places, radius_px)
+    if seen is None:
         return Sight()
     a, b = seen(LUMA)
     differs = abs(np.median(a) - np.median(b))
@@ -103,7 +125,7 @@ def best_sight(frames: list[Frame], places: list[tuple[float, float]], radius_px
     # a wall's texture counts as noise here, but is learned later: where brightness differs much, it will do
     if (by_luma > 6 and differs > 20) or (by_luma > 2.5 and differs > 35):
         return Sight()
-    inside, outside = (np.array(p) for p in zip((a, b), seen((0.0, 1.0, 0.0)), seen((0.0, 0.0, 1.0))))
+    inside, outside = (np.array(p) for p in zip((a, b), *map(seen, _COLOURS)))
     difference = np.median(inside, axis=1) - np.median(outside, axis=1)
     mix = np.linalg.solve(np.cov(outside) + 0.5 * np.eye(3), difference)
     by_mix = float(np.sqrt(difference @ mix))
