@@ -14,9 +14,9 @@ T = np.arange(N) / 60
 VX, VY = 500 * np.cos(5 * T), 120 * np.sin(10 * T)
 
 
-def factors(rx, ry, time_sigma=0.0, known=0.0, unsteady=np.inf):
+def factors(rx, ry, time_sigma=0.0, known=0.0, unsteady=np.inf, slow=0.0):
     one = np.ones(N)
-    return true_sigma(T, (rx, ry), (0.02 * one, 0.02 * one), (VX, VY), known * one, time_sigma, unsteady)
+    return true_sigma(T, (rx, ry), (0.02 * one, 0.02 * one), (VX, VY), known * one, time_sigma, unsteady, slow_px=slow)
 
 
 def test_quick_and_slow_errors_of_a_localiser_both_count():
@@ -55,15 +55,19 @@ def test_a_shaking_camera_is_told_from_the_localiser_by_what_is_across_the_motio
     assert found.shake_px == pytest.approx(1.0, rel=0.3)
 
 
-def test_before_a_camera_that_stood_still_slow_errors_are_the_localisers():
+def test_slow_errors_are_the_localisers_as_far_as_the_bobs_picture_lets_it_err():
     rng = np.random.default_rng(3)
     quick = rng.normal(0, 0.03, (2, N))
     pattern = 0.5 * np.sin(np.outer([3.0, 4.0], T)) * np.sqrt(2)  # a pattern that turns
-    found = factors(*(quick + pattern), unsteady=0.03)
+    found = factors(*(quick + pattern), unsteady=0.03, slow=1.0)
     assert (found.x, found.y) == (pytest.approx(25, rel=0.1), pytest.approx(25, rel=0.1))
     assert found.shake_px == 0
-    late = 0.01 * np.sign(np.sin(3 * T))  # a clock is no localiser: where the bob is slow it does not show
-    found = factors(quick[0] + VX * late, quick[1] + VY * late, unsteady=0.03)
+    found = factors(
+        *(quick + pattern), unsteady=0.03, slow=0.1
+    )  # an even disc is not found half a pixel off: the motion is another
+    assert (found.x, found.y) == (pytest.approx(1.5, rel=0.3), pytest.approx(1.5, rel=0.3))
+    late = 0.01 * np.sign(np.sin(3 * T))  # nor is a clock a localiser
+    found = factors(quick[0] + VX * late, quick[1] + VY * late, unsteady=0.03, slow=1.0)
     assert (found.x, found.y) == (pytest.approx(1.5, rel=0.3), pytest.approx(1.5, rel=0.3))
 
 
@@ -85,6 +89,29 @@ def test_a_clock_that_errs_or_a_drive_is_no_shake():
     jitter = rng.normal(0, 3e-4, N)
     found = factors(quick[0] + VX * jitter, quick[1] + VY * jitter, time_sigma=3e-4)
     assert (found.x, found.y) == (pytest.approx(1.5, rel=0.25), pytest.approx(1.5, rel=0.25))
+
+
+def test_beside_a_clock_both_axes_are_told_by_what_is_slow_or_across():
+    ratios = []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        own = rng.normal(0, 0.03, (2, N))
+        jitter = rng.uniform(-5e-4, 5e-4, N)  # stamps in whole milliseconds
+        found = factors(own[0] + VX * jitter, own[1] + VY * jitter, time_sigma=1e-3 / np.sqrt(12))
+        ratios.append((found.x / 1.5, found.y / 1.5))
+    assert np.mean(ratios, axis=0) == pytest.approx([1.0, 1.0], abs=0.05)
+    assert np.std(ratios, axis=0).max() < 0.12
+
+
+def test_behind_a_shake_the_axes_are_drawn_together_unless_they_clearly_differ():
+    rng = np.random.default_rng(5)
+    shake = np.sin(np.outer([2.0, 3.0], T)) * np.sqrt(2)
+    for y_px, one in ((0.03, 1.0), (0.15, 5.0)):
+        ratios = []
+        for _ in range(30):
+            found = factors(*(shake + rng.normal(0, [[0.03], [y_px]], (2, N))), known=0.001)
+            ratios.append((found.x / 1.5, found.y / (1.5 * one)))
+        assert np.mean(ratios, axis=0) == pytest.approx([1.06, 1.06], abs=0.06)
 
 
 @pytest.mark.parametrize("wrong_px", [0.0, -45.0, 45.0])

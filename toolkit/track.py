@@ -246,7 +246,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
     off_px = misfit * look.radius_px / 3
     strings = _strings(record, places, shake, look.radius_px, fps_factor)
-    camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor)
+    camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor, look.even)
     lines = strings.seen()
     joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
     # with tilt, lens and shutter taken out some are no strays, and others hid in these

@@ -14,18 +14,23 @@ from toolkit.tracking.view import View
 from toolkit.tracking.view_fit import Lines, fit_view
 
 _VIEWS = 4  # at most
+_EVEN, _UNEVEN = (
+    0.5,
+    2.0,
+)  # times as far as the places may be off, a localiser may err for long, on a bob of one shade or of more
 _SETTLED = 0.6  # another view is fitted only where the last made σ smaller than this share of what it was fitted with
 
 
 class Camera(NamedTuple):
     """What is known of the camera before a view is fitted: the picture's size, the pivot if given, along which axis its rows
-    are read, how far the places may be off the bob's centre, true frame rate over the file's."""
+    are read, how far the places may be off the bob's centre, true frame rate over the file's, whether the bob is of one shade."""
 
     size_px: tuple[int, int]
     pivot_px: tuple[float, float] | None
     rows_along_x: bool
     off_px: float
     fps_factor: float
+    even: bool = True
 
 
 class Joint(NamedTuple):
@@ -45,13 +50,16 @@ def fit_jointly(
     vx, vy = swing.velocity(t)
     late_x, late_y = (np.hypot(v * time_sigma_s, shake.sigma) for v in (vx, vy))
 
+    slow_px = (_EVEN if camera.even else _UNEVEN) * camera.off_px
     unsteady = min(shake.unseen_px, np.inf if lines is None else lines.apart_px)
 
     def factors(x: np.ndarray, y: np.ndarray, rough: bool = False) -> Factors:
         rx, ry = (places.x_px - x)[good], (places.y_px - y)[good]
         sx, sy = places.sigma_x_px[good], places.sigma_y_px[good]
         velocity = vx[good], vy[good]
-        found = true_sigma(t[good], (rx, ry), (sx, sy), velocity, shake.sigma[good], time_sigma_s, unsteady, rough)
+        found = true_sigma(
+            t[good], (rx, ry), (sx, sy), velocity, shake.sigma[good], time_sigma_s, unsteady, rough, slow_px
+        )
         if not shake.taken:
             return found
         # the picture's own places hold the shake, which is smooth, but not the error with which it was measured

@@ -8,9 +8,16 @@ import numpy as np
 
 _FITS = 2.5  # a motion fits where places stray from it by less than so many times their scatter from frame to frame
 _CLOCK = 3.0  # by how much a localiser may be worse along the motion than across it
-_SLOW = 0.35  # of the greatest speed: below it a clock that errs hardly moves the bob
-_FREE = 9  # so many values a fitted motion has taken from the residuals of each axis,
+_ALONG, _ACROSS = 8, 2  # so many values a fitted motion has taken from the residuals along it and across it,
 _LEFT = 0.85  # but of their mean square it has left so much
+_CARRIED = 1.06  # times what changes from frame to frame: a codec carries its errors on into the next pictures
+_CODEC_PX = 0.05  # so far a codec may err for long
+_COUNT = 3  # frames that tell as much of what changes from frame to frame as one would of the whole
+_MORE, _ALIKE = (
+    0.12,
+    0.13,
+)  # by how much factors are ordinarily larger along the motion than across it (natural logarithm, and its standard deviation)
+_TURNS = 30
 _LEAST, _USUAL, _MOST = 0.5, 4.0, 10.0  # what a fit's own σ is multiplied by; beyond the last the quick is not its own
 
 
@@ -31,14 +38,17 @@ def true_sigma(
     time_sigma_s: float,
     unsteady_px: float = np.inf,
     rough: bool = False,
+    slow_px: float = 0.0,
 ) -> Factors:
     """Make the fit's σ agree with the residuals about a motion, all (n,) for x and y over the measured frames at t_s, less
-    what the shake and the clock are known to add. `unsteady_px` is the most that the camera can have moved.
+    what the shake and the clock are known to add. `unsteady_px` is the most that the camera can have moved, `slow_px` the most
+    that the localiser can err for long on a bob of such looks.
 
-    Where the motion fits, or the camera is known to have stood still and no clock errs, its residuals are the localiser's
-    errors, slow ones too (a codec's, a shadow's, a pattern's). Where it does not, what changes from frame to frame is the
-    localiser's; the rest is a camera's shake as far as it is across the motion, where no pendulum moves and no clock errs.
-    About a `rough` motion, or where a shake was taken away, only what changes from frame to frame tells of the localiser.
+    Where the motion fits, or strays no farther than `slow_px` or than a codec errs for long before a camera that is known to have
+    stood still, its residuals are the localiser's errors, slow ones too (a
+    codec's, a shadow's, a pattern's). Where it does not, what changes from frame to frame is the localiser's; the rest is a
+    camera's shake as far as it is across the motion, where no pendulum moves and no clock errs. About a `rough` motion, or
+    where a shake was taken away, only what changes from frame to frame tells of the localiser.
     """
     (rx, ry), (sx, sy), (vx, vy) = residuals, sigmas, velocity
     speed = np.hypot(vx, vy) + 1e-9
@@ -46,30 +56,35 @@ def true_sigma(
     v = max(vx, vy, key=np.std)
     step_rad = float(np.std(np.diff(v)) / np.std(v))  # of the swing's period, from one frame to the next
     across = rx * uy - ry * ux, np.hypot(sx * uy, sy * ux)
-    along = rx * ux + ry * uy, np.hypot(sx * ux, sy * uy)
-    still = unsteady_px < 0.5 * float(np.sqrt(np.mean(rx**2 + ry**2)))
-    # where the bob is slow a clock errs little: what is as large there as anywhere is the localiser's
-    slow, square = speed < _SLOW * speed.max(), _tamed(along[0] / along[1]) ** 2
-    timely = slow.sum() > 20 and np.mean(square[slow]) > 0.5 * np.mean(square)
+    strays_px = float(np.sqrt(np.mean(rx**2 + ry**2)))
+    still = unsteady_px < 0.5 * strays_px
+    slow = strays_px < np.sqrt(2) * max(slow_px, _CODEC_PX if still else 0.0)
     clock = vx * time_sigma_s, vy * time_sigma_s, np.zeros_like(speed)
-    found, fits = [], []
+    found, fits, wholly = [], [], []
     all_s = np.array([sx, sy, across[1]])
     all_r = np.array(
         [_tamed(r / s) * s for r, s in zip((rx, ry, across[0]), all_s)]
     )  # a few pictures may be of another time
-    for r, s, late, scatter in zip(all_r, all_s, clock, quick_scatter(t_s, all_r, all_s)):
+    ways = float(np.mean(ux**2)), float(np.mean(uy**2)), 0.0
+    for r, s, late, scatter, way in zip(all_r, all_s, clock, quick_scatter(t_s, all_r, all_s), ways):
         known = float(np.mean((np.hypot(late, shake_px) / s) ** 2))
         quick = _less(float(scatter) ** 2, known)
-        whole = float(np.mean((r / s) ** 2)) / _left(r / s, step_rad) - known
+        taken = _ACROSS + (_ALONG - _ACROSS) * way
+        whole = _less(float(np.mean((r / s) ** 2)) / _left(r / s, step_rad, taken), known)
         fits.append(whole <= _FITS**2 * quick)
-        if rough or np.any(shake_px) or not (fits[-1] or (still and timely)):
-            found.append(quick if quick < _MOST**2 else np.nan)
+        wholly.append(bool(fits[-1] or (slow and np.isfinite(whole))) and not (rough or np.any(shake_px)))
+        if wholly[-1]:
+            found.append(float(np.fmax(quick, whole)))
         else:
-            found.append(max(quick, whole))
+            found.append(_CARRIED**2 * quick if quick < _MOST**2 else np.nan)
     own = found[2] if np.isfinite(found[2]) else _USUAL**2
-    if still and timely:
-        own = max(own, float(np.mean(square[slow])))
-    x, y = (f if f <= _CLOCK**2 * own else own for f in found[:2])  # the rest is the clock's
+    # the rest is the clock's
+    x, y = (f if f <= _CLOCK**2 * own or (slow and all_of_it) else own for f, all_of_it in zip(found[:2], wholly))
+    more = _MORE * (ways[0] - ways[1])
+    if time_sigma_s and wholly[2]:
+        x, y = _beside_clock(all_r[:2], all_s[:2], np.array(clock[:2]), own, more)
+    elif not (wholly[0] or wholly[1]):
+        x, y = _alike(x, y, rx.size / _COUNT, more)
     left = 0.0
     if not (rough or fits[2] or still):
         r, s = across
@@ -82,9 +97,38 @@ def _less(square: float, known: float) -> float:
     return square - known if square - known > 0.3 * square else np.nan
 
 
-def _left(r: np.ndarray, step_rad: float) -> float:
+def _alike(x: float, y: float, count: float, more: float) -> tuple[float, float]:
+    """Squares of the factors of both axes that rest on so many independent values each, drawn together as far as they are
+    that uncertain, but for what is ordinarily `more` in x; not where they clearly differ."""
+    apart, spread = 0.5 * np.log(y / x) + more, np.sqrt(1 / count + _ALIKE**2)
+    if abs(apart) > 3 * spread:
+        return x, y
+    drawn = float(np.exp(apart / (count * spread**2)))
+    return x * drawn, y / drawn
+
+
+def _beside_clock(r: np.ndarray, s: np.ndarray, late: np.ndarray, start: float, more: float) -> tuple[float, float]:
+    """Squares of the factors of both axes beside a clock that moves the bob by `late` px (standard deviation) along its way:
+    the likeliest for residuals r of the localiser's σ s, all (2, n), ordinarily alike but for `more` in x; by scoring from `start` on."""
+    log = np.full(2, 0.5 * np.log(start))
+    differ = np.array([[1.0, -1.0], [-1.0, 1.0]]) / _ALIKE**2
+    for _ in range(_TURNS):
+        own = np.exp(2 * log)[:, None] * s**2
+        (xx, yy), xy = own + late**2, late[0] * late[1]
+        inverse = np.array([[yy, -xy], [-xy, xx]]) / (xx * yy - xy * xy)
+        pulls = np.sum(inverse * r, axis=1)
+        score = np.sum(own * (pulls**2 - inverse[[0, 1], [0, 1]]), axis=1) - differ @ (log - [more, 0.0])
+        information = 2 * np.einsum("in,jn,ijn->ij", own, own, inverse**2) + differ
+        step = np.linalg.solve(information, score)
+        log = log + np.clip(step, -0.5, 0.5)
+        if np.abs(step).max() < 1e-3:
+            break
+    return float(np.exp(2 * log[0])), float(np.exp(2 * log[1]))
+
+
+def _left(r: np.ndarray, step_rad: float, values: float) -> float:
     """What share of its mean square a fitted motion has left of a series (n,) of which a frame is `step_rad` of a period: it
-    took `_FREE` of the values that are independent of their neighbours, of what changes within a period."""
+    took so many of the values that are independent of their neighbours, of what changes within a period."""
     half = min(int(np.pi / max(step_rad, 1e-3)), r.size - 1)
     slow = np.convolve(np.pad(r, half, "reflect"), np.full(2 * half + 1, 1 / (2 * half + 1)), "valid")
     within, length = r - slow, 1.0
@@ -93,7 +137,7 @@ def _left(r: np.ndarray, step_rad: float) -> float:
         if alike <= 0:
             break
         length += 2 * alike
-    taken = _FREE / r.size
+    taken = values / r.size
     alike = length * float(within @ within) / max(float(r @ r), 1e-300)
     return max(1 - taken * alike, min(_LEFT, 1 - taken), 1 / r.size)
 
