@@ -14,10 +14,8 @@ from toolkit.tracking.view import View
 from toolkit.tracking.view_fit import Lines, fit_view
 
 _VIEWS = 4  # at most
-_EVEN, _UNEVEN = (
-    0.5,
-    2.0,
-)  # times as far as the places may be off, a localiser may err for long, on a bob of one shade or of more
+# times as far as the places may be off: so far a localiser may err for long, on a bob of one shade or of more
+_EVEN, _UNEVEN = 0.5, 2.0
 _SETTLED = 0.6  # another view is fitted only where the last made σ smaller than this share of what it was fitted with
 
 

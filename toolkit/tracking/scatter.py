@@ -13,10 +13,8 @@ _LEFT = 0.85  # but of their mean square it has left so much
 _CARRIED = 1.06  # times what changes from frame to frame: a codec carries its errors on into the next pictures
 _CODEC_PX = 0.05  # so far a codec may err for long
 _COUNT = 3  # frames that tell as much of what changes from frame to frame as one would of the whole
-_MORE, _ALIKE = (
-    0.12,
-    0.13,
-)  # by how much factors are ordinarily larger along the motion than across it (natural logarithm, and its standard deviation)
+# by how much factors are ordinarily larger along the motion than across it (natural logarithm), and its standard deviation
+_MORE, _ALIKE = 0.12, 0.13
 _TURNS = 30
 _LEAST, _USUAL, _MOST = 0.5, 4.0, 10.0  # what a fit's own σ is multiplied by; beyond the last the quick is not its own
 
@@ -62,9 +60,8 @@ def true_sigma(
     clock = vx * time_sigma_s, vy * time_sigma_s, np.zeros_like(speed)
     found, fits, wholly = [], [], []
     all_s = np.array([sx, sy, across[1]])
-    all_r = np.array(
-        [_tamed(r / s) * s for r, s in zip((rx, ry, across[0]), all_s)]
-    )  # a few pictures may be of another time
+    # a few pictures may be of another time
+    all_r = np.array([_tamed(r / s) * s for r, s in zip((rx, ry, across[0]), all_s)])
     ways = float(np.mean(ux**2)), float(np.mean(uy**2)), 0.0
     for r, s, late, scatter, way in zip(all_r, all_s, clock, quick_scatter(t_s, all_r, all_s), ways):
         known = float(np.mean((np.hypot(late, shake_px) / s) ** 2))
