@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import cache
 from typing import TYPE_CHECKING
 
 from toolkit.registry import load_part, part_names
@@ -18,6 +19,7 @@ def tracker_names() -> tuple[str, ...]:
     return part_names(sys.modules[__name__], _NOT_PARTS)
 
 
+@cache
 def load_tracker(name: str) -> Localiser:
     """The localiser of that name. Raises UsageError for an unknown one."""
     found: Localiser = load_part(sys.modules[__name__], name, "LOCALISER", _NOT_PARTS)

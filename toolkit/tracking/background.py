@@ -54,17 +54,17 @@ class Background:
         pivot: tuple[float, float] | None,
     ) -> None:
         """Take in the box of each whole picture (h, w) uint8, whose pixels lie one beside the other in each row, moved by its
-        shift (x, y), as `add` does one by one."""
+        shift (x, y): as `add` does one by one, but that none fades."""
         height, width = self.mean.shape
         x0, y0, x1, y1 = box
         table = [
-            (p.ctypes.data, p.strides[0], dy, dx, max(x0, -dx), max(y0, -dy), min(x1, width - dx), min(y1, height - dy))
+            (p.ctypes.data, p.strides[0], dx, dy, max(x0, -dx), max(y0, -dy), min(x1, width - dx), min(y1, height - dy))
             for p, (dx, dy) in zip(pictures, shifts)
         ]
         each = np.array([_hidden(bob, pivot) for bob in bobs])
-        arrays = np.array(table, np.int64), self.mean, self.seen, each, np.empty(width, np.float32)
+        arrays = np.array(table, np.int64), self.mean, self.seen, each, np.empty(2 * width, np.float32)
         add_all = kernel("add_all", "toolkit.tracking._back_kernel", "the background's mean")
-        call(add_all, *(address(a) for a in arrays), len(table), y0, y1, width)
+        call(add_all, *(address(a) for a in arrays), len(table), *box, width)
 
     def stand_before(self, front: np.ndarray) -> None:
         """What is seen at these pixels, (h, w) bool, hides the bob."""

@@ -81,8 +81,9 @@ def even_light(samples: list[np.ndarray]) -> list[np.ndarray]:
     rows = np.array([p.mean(axis=1) for p in samples])
     if np.median(np.abs(rows / np.maximum(np.median(rows, axis=0), 1.0) - 1)) < _EVEN:
         return samples
-    some = np.stack([p[:, ::4] for p in samples])
-    gains = np.median(some / np.maximum(np.median(some, axis=0), 1.0), axis=2)
+    some = [np.ascontiguousarray(p[:, ::4]) for p in samples]
+    middle = some[0].shape[1] // 2
+    gains = np.partition(some / np.maximum(still_picture(some), 1.0), middle, axis=2)[:, :, middle]
     return [(p / np.clip(g, 0.5, 2.0)[:, None]).astype(np.float32) for p, g in zip(samples, gains)]
 
 
