@@ -10,10 +10,12 @@ from toolkit.tracking.swing import NAMES, Swing, fit_swing
 from toolkit.tracking.verdict import STRAIGHT
 from toolkit.tracking.view_fit import Lines
 
+_AS_WELL = 1.2  # times what places stray from the motion without a string: with more, the lines are none of its string
+
 
 def held_swing(swing: Swing, places: Places, lines: Lines | None, size_px: tuple[int, int]) -> Swing:
     """The motion about the point in which the string's lines meet, where by its arc the pivot ran out of all bounds of a picture
-    of `size_px`; else, or where the lines meet no nearer, as it is."""
+    of `size_px`; else, or where the lines meet no nearer or the bob does not swing about that point, as it is."""
     beyond = STRAIGHT * float(np.hypot(*size_px))
     if swing.length_px <= beyond or lines is None:
         return swing
@@ -30,4 +32,5 @@ def held_swing(swing: Swing, places: Places, lines: Lines | None, size_px: tuple
     start[:4] = px, py, length, direction.mean()
     start[5:] = 0.0, 0.0, direction[0] - direction.mean(), float(along @ np.ravel(swing.velocity(t[:1]))) / length
     free = tuple(name for name in NAMES if not name.startswith("pivot"))
-    return fit_swing(t, x, y, np.full(some.size, 0.1), start, free=free) or swing
+    held = fit_swing(t, x, y, np.full(some.size, 0.1), start, free=free)
+    return held if held is not None and held.rms_px < _AS_WELL * swing.rms_px else swing
