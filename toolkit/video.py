@@ -7,6 +7,7 @@ for timing; what is odd about the clock is said in `clock_warnings`.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -22,6 +23,7 @@ _PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 # 8-bit formats whose plane 0 is the luma itself
 _LUMA_FIRST = re.compile(r"^(yuvj?4\d\dp|yuva4\d\dp|nv12|nv21|nv16|gray|gray8)$")
 _DEEP_LUMA = re.compile(r"^(?:yuva?4\d\dp|gray)(9|10|12|14|16)le$")
+_MOST_AHEAD, _BYTES_AHEAD = 16, 5e7  # frames being decoded (the decoder's own limit), and the memory they may take
 
 
 class Frame:
@@ -177,6 +179,7 @@ def _decode_pyav(path: Path, rotation: int, fps: float | None) -> Iterator[Frame
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         stream.thread_type = "AUTO"
+        stream.codec_context.thread_count = _ahead(stream.width, stream.height)
         base = float(stream.time_base) if stream.time_base else 0.0
         frames = iter(container.decode(stream))
         while True:
@@ -196,6 +199,13 @@ def _decode_pyav(path: Path, rotation: int, fps: float | None) -> Iterator[Frame
             luma = _luma(picture)
             yield Frame(index, stamp - first, np.rot90(luma, turns) if turns else luma, _colour_of(picture, turns))
             index += 1
+
+
+def _ahead(width_px: int, height_px: int) -> int:
+    """How many frames are decoded at once: more than there are processors, so that they are at work while something else is
+    done with the frames, where that takes little memory."""
+    little = int(_BYTES_AHEAD / max(1.5 * width_px * height_px, 1.0))
+    return min(_MOST_AHEAD, max((os.cpu_count() or 1) + 1, little))
 
 
 def _luma(picture: Any) -> np.ndarray:
