@@ -23,7 +23,7 @@ _PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 # 8-bit formats whose plane 0 is the luma itself
 _LUMA_FIRST = re.compile(r"^(yuvj?4\d\dp|yuva4\d\dp|nv12|nv21|nv16|gray|gray8)$")
 _DEEP_LUMA = re.compile(r"^(?:yuva?4\d\dp|gray)(9|10|12|14|16)le$")
-_MOST_AHEAD, _BYTES_AHEAD = 16, 5e7  # frames being decoded (the decoder's own limit), and the memory they may take
+_MOST_AHEAD, _BYTES_AHEAD = 16, 2.5e7  # frames being decoded (the decoder's own limit), and the memory they may take
 
 
 class Frame:
