@@ -66,8 +66,7 @@ class Trail:
         return (
             place is not None
             and hypot(place[0] - x, place[1] - y) < 0.2 * self.look.radius_px
-            and 0.9 < look.radius_px / self.look.radius_px < 1.1
-            and 0.8 < look.contrast / self.look.contrast < 1.25
+            and _alike(look, self.look)
         )
 
     @property
@@ -162,8 +161,7 @@ class Trail:
         look = self.look
         return (
             hypot(x - guess.x_px, y - guess.y_px) < 0.25 * look.radius_px
-            and 0.9 < seen.radius_px / look.radius_px < 1.1
-            and 0.8 < seen.contrast / look.contrast < 1.25
+            and _alike(seen, look)
             and seen.noise < 1.25 * look.noise + 0.5
         )
 
@@ -177,6 +175,11 @@ class Trail:
         if found is None or found[2] < 0.5:
             return False
         return self._take(i, Guess(found[0] + patch.x_px, found[1] + patch.y_px))
+
+
+def _alike(one: Look, other: Look) -> bool:
+    """Are size and contrast of two things about the same?"""
+    return 0.9 < one.radius_px / other.radius_px < 1.1 and 0.8 < one.contrast / other.contrast < 1.25
 
 
 def _score(look: Look, rms_px: float) -> float:

@@ -38,19 +38,20 @@ def _grown(values: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, chos
     period = 2 * np.pi / np.sqrt(max(values[4], 1e-9))
     stop = t[chosen[0]] + max(0.75 * period, 0.3)
     while True:
+        whole = stop >= t[-1]
         part = chosen[t[chosen] <= stop]
         if part.size >= 12:
-            calm, most = (CALM, 150) if stop < t[-1] else (None, 1500)
-            p = part[:: max(1, part.size // most)]
+            p = part[:: max(1, part.size // (1500 if whole else 150))]
             # damping seen over a second or so may be none, and leads nowhere later
             undamped = np.where([name in CALM for name in NAMES], 0.0, values)
-            for start, prior in ((values, calm), (values, CALM), (undamped, CALM)):
+            free = [(values, None)] if whole else []
+            for start, prior in [*free, (values, CALM), (undamped, CALM)]:
                 swing = fit_swing(t[p], x[p], y[p], np.full(p.size, 0.5), start, prior=prior)
                 if swing is not None:
                     break
             if swing is None:
                 return None
             values = swing.values
-        if stop >= t[-1]:
+        if whole:
             return swing
         stop = t[chosen[0]] + 2 * (stop - t[chosen[0]])
