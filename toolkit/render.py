@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,8 +34,9 @@ class Truth:
 
     frame : (n,) decoded frames from 0.    t_s : (n,) mid-exposure time at the bob's row, scene time; equal to the time
     stamp unless the shutter rolls, a frame repeats the one before or stamps are wrong.    theta_rad : (n,) θ then.
-    x_px, y_px : (n,) the bob's position in that frame's pixels, mean over the exposure.    visible : (n,) fraction of
-    the bob's light that nothing hides and the picture holds.    stamp_s : (n,) the file's time stamps.
+    x_px, y_px : (n,) the middle of the bob's light in that frame's pixels, mean over the exposure (an even bob's that
+    nothing hides): a lens or a near camera shows that beside the image of the ball's centre (`camera.outline`).
+    visible : (n,) fraction of the bob's light that nothing hides and the picture holds.    stamp_s : (n,) the file's time stamps.
     radius_px : (n,) the bob's mean radius.    pivot_px : (n, 2) the pivot.
     """
 
@@ -129,6 +130,26 @@ def _chance(seed: int, name: str, number: int = 0) -> np.random.Generator:
     return np.random.default_rng([abs(int(seed)), int(seed) < 0, zlib.crc32(name.encode()), number])
 
 
+class Outlines(NamedTuple):
+    """A ball's outline in the picture at k moments, see `cover_disc`; and its light: the centre (k, 2) and the radius (k,) of
+    a disc of its area."""
+
+    shapes: np.ndarray
+    rests: np.ndarray | None
+    light_px: np.ndarray
+    radii_px: np.ndarray
+
+
+class Exposure(NamedTuple):
+    """The k moments that stand for one exposure: the images of the ball's centre (k, 2), its outlines (`cover_disc`), and
+    when (k,) in s."""
+
+    centres: np.ndarray
+    shapes: np.ndarray
+    when: np.ndarray
+    rests: np.ndarray | None
+
+
 class Studio:
     """A staged film: its plan (`shoot`), its `truth`, and the frames one by one."""
 
@@ -147,10 +168,17 @@ class Studio:
         shoot = self.shoot
         if shoot.distance_m is None:
             return np.array(shoot.pivot_px) + shoot.px_per_m * xyz[..., :2], np.full(xyz.shape[:-1], shoot.px_per_m)
-        aim = np.append((shoot.middle_px - np.array(shoot.pivot_px)) / shoot.px_per_m, 0.0)
-        seen = (xyz - aim) @ _turn(shoot.yaw_rad, shoot.pitch_rad, shoot.roll_rad).T + [0.0, 0.0, shoot.distance_m]
-        scale = shoot.px_per_m * shoot.distance_m / np.maximum(seen[..., 2], 1e-6)
+        seen = self._from_camera(xyz, shoot.distance_m)
+        scale = shoot.px_per_m * shoot.distance_m / seen[..., 2]
         return shoot.middle_px + scale[..., None] * seen[..., :2], scale
+
+    def _from_camera(self, xyz: np.ndarray, distance_m: float) -> np.ndarray:
+        """The same points in m as a camera sees them from `distance_m`: right, down, ahead."""
+        shoot = self.shoot
+        aim = np.append((shoot.middle_px - np.array(shoot.pivot_px)) / shoot.px_per_m, 0.0)
+        seen = (xyz - aim) @ _turn(shoot.yaw_rad, shoot.pitch_rad, shoot.roll_rad).T + [0.0, 0.0, distance_m]
+        seen[..., 2] = np.maximum(seen[..., 2], 1e-6)
+        return seen
 
     def _bend(self, points: np.ndarray, t_s: np.ndarray) -> np.ndarray:
         """The same points after lens and hand shake at times t_s (…)."""
@@ -188,29 +216,46 @@ class Studio:
                 points = self._bend(self._project(self._world(along, when))[0], when)
         return points, when
 
-    def _shapes(self, when: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(k, 2, 2) from a pixel offset to the unit disc of a ball, to first order, and its radius (k,) in px.
+    def _outlines(self, centres: np.ndarray, when: np.ndarray) -> Outlines:
+        """The ball's outline at times `when` (k,), the image of its centre being at `centres` (k, 2).
 
-        The ball's outline before the lens is a circle; lens and shake act by their Jacobian, the rolling shutter by the
-        shear d -> d − v τ d_y of a disc that moves at v px/s while rows are τ s apart.
+        Before the lens it is a circle; lens and shake act by their Jacobian, the rolling shutter by the shear
+        d -> d − v τ d_y of a disc that moves at v px/s while rows are τ s apart. What a lens or a near camera add to this
+        first order is in `rests`, and moves the light beside the image of the centre.
         """
-        ones = np.ones_like(when)
+        from toolkit.camera.outline import bent_shapes, centre_of_light, seen_ball
+
+        shoot, ones = self.shoot, np.ones_like(when)
         flat, scale = self._project(self._world(ones, when))
-        radius = self.shoot.radius_m * scale
+        radius = shoot.radius_m * scale
         step = 0.5
         columns = [
             (self._bend(flat + step * axis, when) - self._bend(flat - step * axis, when)) / (2 * step)
             for axis in np.eye(2)
         ]
         shapes = np.linalg.inv(np.stack(columns, axis=-1) * radius[:, None, None])
-        if self.shoot.readout_s:
+        shear = np.broadcast_to(np.eye(2), shapes.shape).copy()
+        if shoot.readout_s:
             dt = 1e-5
             before, after = (self._bend(self._project(self._world(ones, w))[0], w) for w in (when - dt, when + dt))
             speed = (after - before) / (2 * dt)
-            shear = np.broadcast_to(np.eye(2), shapes.shape).copy()
-            shear[:, :, 1] -= speed * (self.shoot.readout_s / self.shoot.height_px)
+            shear[:, :, 1] -= speed * (shoot.readout_s / shoot.height_px)
             shapes = shapes @ shear
-        return shapes, 1 / np.sqrt(np.abs(np.linalg.det(shapes)))
+        if shoot.distance_m is None and not shoot.lens:
+            return Outlines(shapes, None, centres, 1 / np.sqrt(np.abs(np.linalg.det(shapes))))
+        middle, spread = flat, radius[:, None, None] * np.eye(2)
+        if shoot.distance_m is not None:
+            seen = self._from_camera(self._world(ones, when), shoot.distance_m)
+            middle, spread = seen_ball(seen, shoot.radius_m, shoot.px_per_m * shoot.distance_m)
+            middle = shoot.middle_px + middle
+        unrolled = np.swapaxes(np.linalg.inv(shear), 1, 2)
+        straight = self._bend(flat, when)[:, None]
+
+        def bend(points: np.ndarray) -> np.ndarray:
+            return centres[:, None] + (self._bend(points, when[:, None]) - straight) @ unrolled
+
+        light, radii = centre_of_light(bend, middle, spread)
+        return Outlines(shapes, bent_shapes(bend, flat, shapes, middle, spread), light, radii)
 
     # --- the exposures and the truth -----------------------------------------------------------------------------
 
@@ -224,18 +269,16 @@ class Studio:
         ends = [self._see(np.ones(captured.size), captured + dt)[0] for dt in (-half, 0, half)]
         paths = np.hypot(*(ends[1] - ends[0]).T) + np.hypot(*(ends[2] - ends[1]).T)
         fewest = 8 if shoot.exposure_s > 0 else 1  # at a turning point the path is short but the mean still shifts
-        self.exposures = []
+        self.exposures: list[Exposure] = []
         rows = []
         for t, path in zip(captured, paths):
             k = max(fewest, math.ceil(path / (0.8 * self.sigma_px)))
             moments = t + shoot.exposure_s * ((np.arange(k) + 0.5) / k - 0.5)
             centres, when = self._see(np.ones(k), moments)
-            shapes, radii = self._shapes(when)
-            self.exposures.append((centres, shapes, when))
+            shapes, rests, light, radii = self._outlines(centres, when)
+            self.exposures.append(Exposure(centres, shapes, when, rests))
             pivot = self._see(np.zeros(1), np.array([t]))[0][0]
-            rows.append(
-                (t + float(shoot.row_delay_s(centres[:, 1].mean())), *centres.mean(axis=0), radii.mean(), *pivot)
-            )
+            rows.append((t + float(shoot.row_delay_s(light[:, 1].mean())), *light.mean(axis=0), radii.mean(), *pivot))
         t_s, x, y, radius, pivot_x, pivot_y = np.array(rows)[self._take].T
         theta = self._theta(t_s)
         self._views = [
@@ -270,7 +313,7 @@ class Studio:
     def _visible(self, number: int) -> float:
         """Fraction of the bob's light that reaches the picture: inside it and before nothing (front patches)."""
         shoot = self.shoot
-        centres, shapes, _ = self.exposures[number]
+        centres, shapes, _, rests = self.exposures[number]
         reach = self._views[number].radius_px + np.ptp(centres, axis=0).max() + 5 * self.sigma_px
         view = self._views[number]
         inside = reach <= view.x_px <= shoot.width_px - 1 - reach and reach <= view.y_px <= shoot.height_px - 1 - reach
@@ -278,7 +321,7 @@ class Studio:
             return 1.0
         from toolkit.camera.paint import cover_disc
 
-        x0, y0, alpha, _ = cover_disc(centres, shapes, self.sigma_px)
+        x0, y0, alpha, _ = cover_disc(centres, shapes, self.sigma_px, rests=rests)
         whole = alpha.sum()
         for patch in (patch for front in shoot.front for patch in front(view)):
             height, width = patch.alpha.shape
@@ -327,7 +370,7 @@ class Studio:
             along, half = np.linspace(0, 1, _STRING_POINTS), shoot.exposure_s / 2
             start, middle, end = (self._see(along, np.full(along.size, view.t_s + dt))[0] for dt in (-half, 0, half))
             lay_line(image, middle, end - start, shoot.string_width_px, self.sigma_px, self._light(shoot.string_rgb))
-        centres, shapes, when = self.exposures[number]
+        centres, shapes, when, rests = self.exposures[number]
         colours = None
         if (look := shoot.look) is not None:
             thetas = self._theta(when)
@@ -335,7 +378,7 @@ class Studio:
             def colours(u: np.ndarray, v: np.ndarray, k: int) -> np.ndarray:
                 return self._light(look(u, v, float(thetas[k]), float(when[k])))
 
-        x0, y0, alpha, light = cover_disc(centres, shapes, self.sigma_px, colours)
+        x0, y0, alpha, light = cover_disc(centres, shapes, self.sigma_px, colours, rests)
         lay(image, Patch(x0, y0, alpha, shoot.bob_rgb), self._light(shoot.bob_rgb) if light is None else light)
         for patch in (patch for front in shoot.front for patch in front(view)):
             lay(image, patch, self._light(patch.rgb))

@@ -23,12 +23,17 @@ def edge_sigma(point_spread_px: float, extra_px: float = 0.0) -> float:
 
 
 def cover_disc(
-    centres: np.ndarray, shapes: np.ndarray, sigma_px: float, colours: Painter | None = None
+    centres: np.ndarray,
+    shapes: np.ndarray,
+    sigma_px: float,
+    colours: Painter | None = None,
+    rests: np.ndarray | None = None,
 ) -> tuple[int, int, np.ndarray, np.ndarray | None]:
     """Mean coverage of a soft disc that stands at each of `centres` for an equal share of the exposure.
 
     centres : (k, 2) px.    shapes : (k, 2, 2), from a pixel offset to the unit disc.    colours : None, or a function
-    (u, v, k) -> (h, w, 3) of unit-disc coordinates. Returns x0, y0, alpha (h, w) and the mean colour (h, w, 3).
+    (u, v, k) -> (h, w, 3) of unit-disc coordinates.    rests : None, or what `shapes` leave out of the map to the unit disc
+    (`outline.bent_shapes`). Returns x0, y0, alpha (h, w) and the mean colour (h, w, 3).
     The disc's area is kept: a soft disc of radius r' covers π(r'² + σ²) (integral of the normal edge), so r'² = r² − σ².
     """
     from scipy.special import ndtr
@@ -44,7 +49,12 @@ def cover_disc(
         u = m[0, 0] * (x - cx) + m[0, 1] * (y - cy)
         v = m[1, 0] * (x - cx) + m[1, 1] * (y - cy)
         inner = math.sqrt(max(radius**2 - sigma_px**2, (0.2 * radius) ** 2))
-        share = ndtr((inner - radius * np.hypot(u, v)) / sigma_px)
+        if rests is None:
+            far = radius * np.hypot(u, v)
+        else:
+            u, v, far = _bent(u, v, (x - cx) / radius, (y - cy) / radius, m * radius, rests[k])
+            far *= radius
+        share = ndtr((inner - far) / sigma_px)
         alpha += share
         if light is not None and colours is not None:
             light += share[:, :, None] * colours(u, v, k)
@@ -52,6 +62,22 @@ def cover_disc(
     if light is not None:
         light /= len(centres) * np.maximum(alpha, 1e-12)[:, :, None]
     return int(x0), int(y0), alpha, light
+
+
+def _bent(
+    u: np.ndarray, v: np.ndarray, right: np.ndarray, down: np.ndarray, shape: np.ndarray, rest: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unit-disc coordinates with their `rest`, and 1 more than the distance from the outline, inwards negative: to first
+    order from the slopes there, so that an edge is as soft on all sides. `right`, `down`, distance and `shape` in radii."""
+    count = rest.shape[-1]
+    across, along = np.vander(right.ravel(), count, increasing=True), np.vander(down.ravel(), count, increasing=True)
+    power = np.arange(1, count)
+    u, v = u + along @ rest[0] @ across.T, v + along @ rest[1] @ across.T
+    u_right, v_right = (row + along @ (r[:, 1:] * power) @ across[:, :-1].T for row, r in zip(shape[:, 0], rest))
+    u_down, v_down = (row + along[:, :-1] @ (r[1:] * power[:, None]) @ across.T for row, r in zip(shape[:, 1], rest))
+    far = np.hypot(u, v)
+    steep = np.hypot(u * u_right + v * v_right, u * u_down + v * v_down) / np.maximum(far, 1e-9)
+    return u, v, 1 + (far - 1) / np.maximum(steep, 0.5)
 
 
 def soft_disc(

@@ -28,6 +28,6 @@ EFFECT = CameraEffect(
         ),
     ),
     apply=apply,
-    off={"yaw_rad": 0.0, "pitch_rad": 0.0, "roll_rad": 0.0},
+    off={"yaw_rad": 0.0, "pitch_rad": 0.0, "roll_rad": 0.0, "distance_m": 1e6},
     example={"yaw_rad": 0.26, "pitch_rad": 0.1, "roll_rad": 0.05, "distance_m": 1.5},
 )

@@ -165,11 +165,11 @@ def cramer_rao_px(studio: Studio) -> tuple[float, float]:
     variance = shoot.read_sigma**2 + shoot.shot_sigma_at_white**2 * level / 255
     noise = math.sqrt(variance * float(LUMA @ LUMA) * LUMA_SCALE**2 + 1 / 12)
     bounds = []
-    for centres, shapes, _ in studio.exposures[:: max(1, len(studio.exposures) // 12)]:
+    for centres, shapes, _, rests in studio.exposures[:: max(1, len(studio.exposures) // 12)]:
         row = []
         for axis in np.eye(2):
             (x0, y0, a, _), (x1, y1, b, _) = (
-                cover_disc(centres + side * 1e-3 * axis, shapes, studio.sigma_px) for side in (-1, 1)
+                cover_disc(centres + side * 1e-3 * axis, shapes, studio.sigma_px, rests=rests) for side in (-1, 1)
             )
             if (x0, y0, a.shape) == (x1, y1, b.shape):  # else a pixel row came in: this film has other frames
                 row.append(noise / (contrast * math.sqrt(np.sum(((b - a) / 2e-3) ** 2))))
