@@ -309,6 +309,25 @@ def test_a_shake_without_which_the_bob_swings_more_evenly_was_none(real):
     assert motion.rms_px < 0.1  # the sway alone is 0.28
 
 
+@pytest.mark.parametrize("rolls", [True, False])
+def test_what_noise_a_shake_was_measured_with_is_smoothed_away_and_what_is_left_is_told(rolls):
+    t = np.arange(240) / 60
+    rng = np.random.default_rng(8)
+    x, y = 320 + 250 * np.sin(0.7 * np.cos(4.1 * t)), np.full(t.size, 480.0)
+    sway, roll = 2.0 * np.sin(5.0 * t), rolls * 0.002 * np.sin(3.1 * t)
+    true_x, true_y = sway - roll * (y - 240), roll * (x - 320)
+    seen = sway + rng.normal(0, 0.05, t.size), rng.normal(0, 0.05, t.size), roll + rolls * rng.normal(0, 2e-4, t.size)
+    record = SimpleNamespace(
+        index=list(range(t.size)),
+        shift=[CameraShift(*row, 320.0, 240.0, 0.06, 3e-4) for row in np.transpose(seen)],
+        place=[SimpleNamespace(x_px=a, y_px=b) for a, b in zip(x, y)],
+    )
+    shake = Shake(SimpleNamespace(record=record, shaking=True, checks={}), np.ones(t.size, bool))
+    off = np.concatenate([shake.x - true_x, shake.y - true_y])
+    assert np.std(off) < 0.7 * np.std(np.concatenate([shake.raw_x - true_x, shake.raw_y - true_y]))
+    assert 0.75 < np.std(off / np.tile(shake.sigma, 2)) < 1.35
+
+
 def test_single_frames_far_from_those_about_them_are_left_out_and_a_slow_error_is_not():
     t = np.arange(300) / 60
     rng = np.random.default_rng(9)

@@ -45,8 +45,10 @@ class Shake:
         rows = np.array([known[k][:3] for k in at])
         shifts = np.column_stack([np.interp(np.arange(n), at, column) for column in rows.T])
         first = next(k for k in range(n) if r.shift[k] is not None)
-        smooth = shifts.copy()
-        smooth[first:], noise = _smoothed(shifts[first:])
+        smooth, noise = shifts.copy(), np.zeros(3)
+        stated = np.median([(s.sigma_px, s.sigma_px, s.roll_sigma_rad) for s in known.values()], axis=0)
+        for k in range(3):  # each by itself: a roll is measured in other units, and changes at its own pace
+            smooth[first:, k], noise[k] = _smoothed(shifts[first:, k], stated[k])
         one = next(iter(known.values()))
         self.x, self.y = np.zeros(n), np.zeros(n)
         for k, p in enumerate(r.place):
@@ -54,17 +56,19 @@ class Shake:
             self.x[k], self.y[k] = one._replace(x_px=smooth[k, 0], y_px=smooth[k, 1], roll_rad=smooth[k, 2]).at(*where)
             if k >= first:
                 self.raw_x[k], self.raw_y[k] = r.shift[k].at(*where)  # type: ignore[union-attr]
-        self.sigma = np.full(n, noise)
+        apart = [
+            (p.x_px - one.centre_x_px, p.y_px - one.centre_y_px) if ok else (0.0, 0.0) for p, ok in zip(r.place, good)
+        ]
+        self.sigma = np.sqrt(0.5 * (noise[0] ** 2 + noise[1] ** 2 + noise[2] ** 2 * np.sum(np.square(apart), axis=1)))
         self.extent_px = np.ptp(shifts, axis=0)[:2]
 
     def look_at_string(self, places: Places, lines: Lines) -> None:
         """Where the background shows no shake, let the string's lines tell it."""
         found = None if self.taken else shake_on_string(places, lines)
         if found is not None:
-            moved, noise = _smoothed(found[0])
-            self.x, self.y = moved.T
-            self.sigma = np.maximum(found[1], noise)
-            self.extent_px = np.ptp(moved, axis=0)
+            (self.x, across), (self.y, down) = (_smoothed(column, float(np.median(found[1]))) for column in found[0].T)
+            self.sigma = np.maximum(found[1], np.hypot(across, down) / np.sqrt(2))
+            self.extent_px = np.array([np.ptp(self.x), np.ptp(self.y)])
             self.taken = self.by_string = True
 
     def told(self, left_px: float = 0.0) -> list[str]:
@@ -90,7 +94,7 @@ class Shake:
                 "background (to {noise_px:.3f} px a frame) and taken away.",
                 across_px=float(self.extent_px[0]),
                 down_px=float(self.extent_px[1]),
-                noise_px=float(self.sigma[0]),
+                noise_px=float(np.median(self.sigma)),
             )
         ]
 
@@ -109,25 +113,22 @@ class Shake:
         return replace(places, x_px=x, y_px=y), still
 
 
-def _smoothed(values: np.ndarray) -> tuple[np.ndarray, float]:
-    """Columns of `values` (n, k) by local parabolas over the longest window that adds no misfit; and what noise is left."""
+def _smoothed(values: np.ndarray, most: float) -> tuple[np.ndarray, float]:
+    """`values` (n,) by local parabolas over the window that leaves the least error, as the rest tells it (Mallows's C_p), and that
+    error; their noise is `most` at most."""
     n = len(values)
     if n < 12:
-        return values, 0.0
+        return values, most
     third = values[3:] - 3 * values[2:-1] + 3 * values[1:-2] - values[:-3]
-    noise = float(1.4826 * np.median(np.abs(third)) / np.sqrt(20))
-    best, left = values, noise
-    for width in (5, 9, 15, 25, 41):
-        if width > n // 2:
+    noise = min(most, float(1.4826 * np.median(np.abs(third)) / np.sqrt(20)))
+    best, least = values, noise**2
+    for half in (2, 4, 7, 12, 20):
+        if half > n // 4:
             break
-        half = width // 2
-        at = np.arange(-half, half + 1)
-        kernel = np.linalg.pinv(np.vander(at, 3, increasing=True))[0]
-        padded = np.pad(values, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
-        smooth = np.column_stack([np.convolve(c, kernel[::-1], "valid") for c in padded.T])
-        rest = values - smooth
-        own = noise * np.sqrt(1 - kernel[half])
-        if np.sqrt(np.mean(rest**2)) > 1.25 * own + 1e-4:
-            break
-        best, left = smooth, noise * float(np.sqrt(kernel[half]))
-    return best, left
+        kernel = np.linalg.pinv(np.vander(np.arange(-half, half + 1), 3, increasing=True))[0]
+        smooth = np.convolve(np.pad(values, half, mode="reflect", reflect_type="odd"), kernel[::-1], "valid")
+        share = float(kernel[half])  # of the noise's variance that is left, and by how much the rest has less
+        error = max(float(np.mean((values - smooth) ** 2)) - noise**2 * (1 - 2 * share), noise**2 * share)
+        if error < least:
+            best, least = smooth, error
+    return best, float(np.sqrt(least))

@@ -15,7 +15,8 @@ from toolkit.tracking.search import shrink
 
 
 class CameraShift(NamedTuple):
-    """Shift (px) and roll (rad) about `centre` of the picture against the first frame, and the shift's uncertainty."""
+    """Shift (px) and roll (rad) about `centre`, the middle of what was followed, against the first frame, and the uncertainties of
+    the shift (per axis) and of the roll."""
 
     x_px: float
     y_px: float
@@ -23,6 +24,7 @@ class CameraShift(NamedTuple):
     centre_x_px: float
     centre_y_px: float
     sigma_px: float
+    roll_sigma_rad: float = 0.0
 
     def at(self, x_px: float, y_px: float) -> tuple[float, float]:
         """How far the still point that was at (x, y) in the first frame has moved."""
@@ -35,6 +37,8 @@ _HALF = 12
 _BLUR = 3
 _WIDTH = 640  # px: so wide a picture shows where corners are
 _WORST_SIGMA_PX = 0.15
+_ROLL = 0.004  # rad: so far hands roll a camera (a standard deviation, by judgement)
+_WINDOW_PX = 0.03  # what a window's place may be off by for other reasons than noise
 
 
 class Anchors:
@@ -61,7 +65,7 @@ class Anchors:
             window[:] = _window(luma, x, y)
         good = _place_sigma(windows, noise) < _WORST_SIGMA_PX
         self.points, self.windows = points[good], windows[good]
-        self.centre = (luma.shape[1] / 2, luma.shape[0] / 2)
+        self._centre()
         self._last = np.zeros((len(self.points), 2))
         self._found = np.zeros(len(self.points))  # on how many pictures each window was
         self._asked = 0
@@ -75,7 +79,12 @@ class Anchors:
         stays = self._found >= 0.5 * self._asked
         self.points, self.windows, self._last = self.points[stays], self.windows[stays], self._last[stays]
         self._found = self._found[stays]
+        self._centre()
         return not stays.all()
+
+    def _centre(self) -> None:
+        """Shift and roll about the windows' middle are measured independently."""
+        self.centre = (float(self.points[:, 0].mean()), float(self.points[:, 1].mean())) if len(self) else (0.0, 0.0)
 
     def shift(self, luma: np.ndarray) -> CameraShift | None:
         """The camera's shift in this frame; None where the windows are too few or disagree."""
@@ -93,7 +102,7 @@ class Anchors:
         self._asked += 1
         if good.sum() < 2:
             return None
-        sigma = np.sqrt(moved[:, 2] ** 2 + 0.01**2)
+        sigma = np.hypot(moved[:, 2], _WINDOW_PX)
         middle = np.median(moved[good, :2], axis=0)
         off = np.hypot(*(moved[:, :2] - middle).T)
         limit = max(1.0, 3 * float(np.median(off[good])))
@@ -101,31 +110,27 @@ class Anchors:
         first, *others = moved[good, :2]
         if not others or (len(others) == 1 and np.hypot(*(others[0] - first)) > 3.0):
             return None  # one window alone, or one of two that disagree, may sit on something that moves
-        weight = np.where(good, 1 / sigma**2, 0.0)
         dx, dy = self.points[:, 0] - self.centre[0], self.points[:, 1] - self.centre[1]
-        spread = float(np.sqrt(np.average(dx * dx + dy * dy, weights=weight)))
-        roll = 0.0
-        if good.sum() >= 4 and spread > 80:
-            one, nil = np.ones(n), np.zeros(n)
-            design = np.concatenate([np.column_stack([one, nil, -dy]), np.column_stack([nil, one, dx])])
-            value = np.concatenate([moved[:, 0], moved[:, 1]])
-            for _ in range(3):
-                w = np.sqrt(np.concatenate([weight, weight]))
-                a = np.linalg.lstsq(design * w[:, None], value * w, rcond=None)[0]
-                rest = (value - design @ a).reshape(2, n)
-                size = np.hypot(*rest)
-                weight = np.where(good & (size < max(0.3, 3 * float(np.median(size[good])))), 1 / sigma**2, 0.0)
-                if not (weight > 0).any():
-                    return None
-            x, y, roll = (float(v) for v in a)
+        one, nil = np.ones(n), np.zeros(n)
+        design = np.concatenate([np.column_stack([one, nil, -dy]), np.column_stack([nil, one, dx])])
+        value = np.concatenate([moved[:, 0], moved[:, 1]])
+        weight = np.where(good, 1 / sigma**2, 0.0)
+        for _ in range(3):
+            pull = (design * np.tile(weight, 2)[:, None]).T
+            covariance = np.linalg.inv(pull @ design + np.diag([0.0, 0.0, 1 / _ROLL**2]))
+            x, y, roll = (covariance @ pull @ value).tolist()
+            size = np.hypot(*(value - design @ (x, y, roll)).reshape(2, n))
             used = weight > 0
-            scatter = float(np.sqrt(np.mean(rest[:, used] ** 2) / max(1, used.sum() - 1.5)))
-        else:
-            x, y = (float(np.average(moved[:, i], weights=weight)) for i in range(2))
-            scatter = float(1 / np.sqrt(weight.sum()))
+            worse = float(np.sum(weight * size**2)) / max(1.0, 2 * used.sum() - 3)
+            near = good & (size < max(0.3, 3 * float(np.median(size[good]))))
+            if not near.any():
+                return None
+            weight = np.where(near, 1 / sigma**2, 0.0)
+        error = np.sqrt(np.diag(covariance) * max(worse, 1.0))
         self._last[:, 0] = x - roll * dy
         self._last[:, 1] = y + roll * dx
-        return CameraShift(x, y, roll, *self.centre, max(scatter, 1e-3))
+        shift_sigma = max(float(np.hypot(error[0], error[1])) / np.sqrt(2), 1e-3)
+        return CameraShift(x, y, roll, *self.centre, shift_sigma, min(float(error[2]), _ROLL))
 
 
 def _pixel_noise(picture: np.ndarray) -> float:
