@@ -42,7 +42,8 @@ def locate(patch: Patch, look: Look, guess: Guess) -> Place:
     if out is None or out[4] <= 0 or out[5] <= 0:
         return NOWHERE
     cx, cy, _, _, xx, yy, _, misfit, visible, contrast, gain, _, wall, _ = out
-    return Place(cx + patch.x_px, cy + patch.y_px, sqrt(xx), sqrt(yy), misfit, visible, contrast, gain * wall)
+    light = min(max(gain, 0.3), 3.0) if wall > 1.0 else 1.0
+    return Place(cx + patch.x_px, cy + patch.y_px, sqrt(xx), sqrt(yy), misfit, visible, contrast, gain * wall, light)
 
 
 _GIVEN, _FOUND, _PLACES = Struct("11d"), Struct("14d"), Struct("15q")  # what the kernel takes and gives, and its places

@@ -57,7 +57,8 @@ class Guess(NamedTuple):
 class Place(NamedTuple):
     """Where the bob was found. `misfit` is what the localiser's idea of the bob leaves unexplained of the picture (rms, grey
     levels): by it the pipeline chooses between localisers. `visible` is the fraction of the outline that was seen, `contrast`
-    bob minus wall, `wall` the level of the wall if it was measured. A localiser that finds nothing returns NaN for x and y."""
+    bob minus wall, `wall` the level of the wall if it was measured, `light` how bright the light on it is against that when the
+    background was learned. A localiser that finds nothing returns NaN for x and y."""
 
     x_px: float
     y_px: float
@@ -67,6 +68,7 @@ class Place(NamedTuple):
     visible: float
     contrast: float
     wall: float = np.nan
+    light: float = 1.0
 
 
 def disc_share(distance: np.ndarray, look: Look) -> np.ndarray:

@@ -8,36 +8,19 @@ from typing import Any
 from toolkit.motion.kernels.pointer import greys, pixels, reals
 from toolkit.tracking._sine import part
 
-# The caller's places for `level`: addresses of the picture, of the offsets (all x, then all y), of the numbers (x, y, reach)
-# and of the result (the mean, 0 of none); then how many offsets there are, the picture's rows and columns, and elements from one
-# row to the next.
-PICTURE, OFFSETS, NUMBERS, RESULT, COUNT, ROWS, COLUMNS, DOWN = range(8)
-# For `told`: the numbers are x, y, reach, the bob's shade, the light, by how much a spot must differ from the shade to tell, and
-# where the picture's first pixel lies in the still one; the result is whether each spot lies in both pictures or in neither, and
-# of how many spots there are that nothing stands before, of how many could be told, of how many are the bob's. Besides: of the
-# still picture (float32) and of what stands before it (bytes, or 0) the addresses, rows, and columns, which lie side by side.
-STILL, FRONT, STILL_ROWS, STILL_COLUMNS = range(8, 12)
+# The caller's places: addresses of the picture (float32), of the offsets (all x, then all y), of the numbers (x, y, reach, the
+# bob's shade, the light, by how much a spot must differ from the shade to tell, and where the picture's first pixel lies in the
+# still one) and of the result (whether each spot lies in both pictures or in neither, of how many spots there are that nothing
+# stands before, of how many could be told, of how many are the bob's); then how many offsets there are, the picture's rows and
+# columns, and elements from one row to the next; of the still picture (float32) and of what stands before it (bytes, or 0) the
+# addresses, rows, and columns, which lie side by side.
+PICTURE, OFFSETS, NUMBERS, RESULT, COUNT, ROWS, COLUMNS, DOWN, STILL, FRONT, STILL_ROWS, STILL_COLUMNS = range(12)
 
 
 @part
 def pixel(offset: float, reach: float, at: float) -> int:
     """The row or column of a spot."""
     return math.floor(reach * offset + at + 0.5)
-
-
-def level(places: Any) -> None:
-    """The mean brightness of the spots that lie in the picture."""
-    count, numbers, offsets, picture = (
-        places[COUNT], reals(places, NUMBERS), reals(places, OFFSETS), pixels(places, PICTURE)
-    )  # fmt: skip
-    total = 0.0
-    seen = 0
-    for i in range(count):
-        x, y = pixel(offsets[i], numbers[2], numbers[0]), pixel(offsets[count + i], numbers[2], numbers[1])
-        if 0 <= x < places[COLUMNS] and 0 <= y < places[ROWS]:
-            total += picture[y * places[DOWN] + x]
-            seen += 1
-    reals(places, RESULT)[0] = total / seen if seen > 0 else 0.0
 
 
 def told(places: Any) -> None:

@@ -18,6 +18,7 @@ STRIPS, STRIP, SLOPES = 24, 65, 26  # sections and their pixels for the first lo
 SECTIONS, HALF, ENDS = 100, 5, 8  # sections at most; pixels to either side that the ridge, and its section, reach
 WIDTH2 = 1.5 * 1.5  # the ridge's variance, px²
 _WIDE = 2 * HALF + 1
+NEAR, STILL = 0.1, 0.03  # px: a step so short ends the look at a piece, and at the whole
 DIGITS = 20  # of a place's fraction
 FINE = 2**DIGITS
 SPARE = max(STRIPS * STRIP, SECTIONS * _WIDE) + 2 * _WIDE + 2 * ENDS
@@ -92,6 +93,7 @@ def ridge(places: Any) -> None:
     b = clearest(places, rest_of, bx, by, ux, uy, start, start + 60.0 if start + 60.0 < far else far)
     height = strength = noise = n00 = n01 = n11 = 0.0
     for stage in range(3):
+        least = STILL if stage == 2 else NEAR
         end = start + (60.0 if stage == 0 else 200.0 if stage == 1 else length)
         end = end if end < far else far
         if end - start < 15.0:
@@ -162,7 +164,7 @@ def ridge(places: Any) -> None:
             b += 0.05 if db > 0.05 else -0.05 if db < -0.05 else db
             noise = math.sqrt(squares / count)
             strength = abs(height) * math.sqrt(hh) / noise
-            if abs(da) < 0.02 and abs(db) * (end - start) < 0.02:
+            if abs(da) < least and abs(db) * (end - start) < least:
                 break
         if strength < 8.0 or abs(height) < 1.5:
             return

@@ -73,9 +73,9 @@ def swing(places: Any) -> None:
         for k in range(used):
             values = skip(motions, k * size)
             w2[k], gamma[k], beta[k], theta[k], rate[k] = values[4], values[5], values[6], values[7], values[8]
-            fast = 0.2 * abs(values[8])  # a step turns it by no more than `turned` can
+            fast = 0.33 * abs(values[8])  # a step turns it by no more than `turned` can
             slow = math.sqrt(abs(values[4]) + 1e-12)
-            longest[k] = 0.06 / (fast if fast > slow else slow)
+            longest[k] = 0.1 / (fast if fast > slow else slow)
         for i in range(times):
             most = 0
             for k in range(used):

@@ -15,14 +15,14 @@ from toolkit.tracking.learn import Known
 from toolkit.tracking.looks import light_on
 from toolkit.tracking.repeat import alike, thinned
 from toolkit.tracking.search import find_round_near, silhouette
-from toolkit.tracking.spots import level_around, tell_bob
+from toolkit.tracking.spots import tell_bob
 from toolkit.tracking.stillness import CameraShift
 from toolkit.tracking.string_line import measure_string
 from toolkit.tracking.swing import CALM, fit_swing, start_swing
 from toolkit.tracking.trail import Rough
 from toolkit.video import Frame
 
-_STRING_EVERY = 3
+_STRING_EVERY, _STRING_DENSE = 3, 180  # frames: so often the string is measured, and for so long; then ever less often
 _SEARCH_EVERY = 4  # hidden frames
 _UNSTEADY_PX = 0.3  # so far places stray from a swing before a camera that a hand holds
 
@@ -78,8 +78,10 @@ class Follower(Known):
             # the motion fitted to the start may be poor at its rim
             guess = self._guess(*self.found[frame.index], guess.streak_x_px, guess.streak_y_px)
         before, self._picture = self._picture, frame
-        repeated = before is not None and alike(before, frame)
-        place, patch = (NOWHERE, None) if repeated else self._measure(frame, guess)
+        place, patch = self._measure(frame, guess)
+        repeated = before is not None and not (patch is not None and self._moved(place)) and alike(before, frame)
+        if repeated:
+            place, patch = NOWHERE, None
         r = self.record
         r.index.append(frame.index)
         r.t_s.append(frame.t_s)
@@ -92,7 +94,8 @@ class Follower(Known):
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
                 self._refit()
             self._update_background(patch, place, guess)
-            if self.unsteady or len(r.index) % _STRING_EVERY == 1:
+            count = len(r.index)
+            if self.unsteady or count % (_STRING_EVERY * (1 + count // _STRING_DENSE)) == 1:
                 self._measure_string(frame, place, shift)
         elif not repeated:
             self.hidden += 1
@@ -102,18 +105,23 @@ class Follower(Known):
             self._look_back(self.first)
             self.first = []
 
+    def _moved(self, place: Place) -> bool:
+        """Is the bob farther from where it was on the picture before than it could be found on the same one?"""
+        r = self.record
+        return r.ok[-1] and hypot(place.x_px - r.place[-1].x_px, place.y_px - r.place[-1].y_px) > 1.0
+
     def _measure(self, frame: Frame, guess: Guess) -> tuple[Place, Patch | None]:
         """Where the bob is, looked for at the guess, then around it; and the patch that shows it, None where what was found is
         not believed."""
         patch = self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)
-        if patch is None or not self._believe(patch, place, guess):
+        if patch is None or not self._believe(place, guess):
             found = self._look_around(frame, guess)
             if found is None:
                 return place, None
             place, patch = found
         again = self._beside_shadow(self.localiser, frame, guess, place)
-        if again is not None and self._believe(again[1], again[0], guess):
+        if again is not None and self._believe(again[0], guess):
             place, patch = again
         return place, patch if self._stands_out(patch, place) else None
 
@@ -175,7 +183,7 @@ class Follower(Known):
             off_arc = abs(np.hypot(other.x_px - px, other.y_px - py) - self.swing.length_px)
             like = other.visible >= least and 0.6 < other.contrast / look.contrast < 1.6
             on_arc = off_arc < 0.5 * look.radius_px + 2 + 2 * self.swing.rms_px
-            if like and on_arc and self._believe(close, other, near):
+            if like and on_arc and self._believe(other, near):
                 return other, close
         return None
 
@@ -200,21 +208,14 @@ class Follower(Known):
             frame, self.look, Guess(float(middle[0]), float(middle[1])), (float(half[0]), float(half[1]))
         )
 
-    def _light(self, patch: Patch, place: Place) -> float:
-        """How bright the light on the bob is against that when the background was learned: by the wall beside it."""
-        if not isfinite(place.wall):
-            return 1.0
-        level = level_around(patch, place.x_px, place.y_px, self.look.radius_px + 2 * self.look.edge_px)
-        return min(max(place.wall / level, 0.3), 3.0) if level > 1 else 1.0
-
-    def _shade_now(self, light: float, place: Place) -> float:
+    def _shade_now(self, place: Place) -> float:
         """The bob's brightness in the light of when the background was learned: the wall beside it is darker or brighter now
         because the light is, or because something else stands there; whichever leaves the bob as it was. In doubt the light
         has changed since the bob was seen last as the whole picture has."""
         seen = place.contrast + place.wall
         if isnan(self._shade):
-            return seen / light
-        shade = min((seen / light, seen), key=lambda s: abs(s - self._shade))
+            return seen / place.light
+        shade = min((seen / place.light, seen), key=lambda s: abs(s - self._shade))
         before, picture = self._lit
         if abs(shade - self._shade) < 0.1 * abs(self.look.contrast) or picture is None or self._picture is None:
             return shade
@@ -227,22 +228,21 @@ class Follower(Known):
         part = (self._speed - slow) / (fast - slow) if fast > slow else 1.0
         return at_slow + (at_fast - at_slow) * min(max(part, 0.0), 1.0)
 
-    def _believe(self, patch: Patch, place: Place, guess: Guess) -> bool:
+    def _believe(self, place: Place, guess: Guess) -> bool:
         look = self.look
         if not isfinite(place.x_px):
             return False
         ratio = place.contrast / look.contrast
-        light = self._light(patch, place)
-        self._shade_seen = self._shade_now(light, place)
+        self._shade_seen = self._shade_now(place)
         shade = abs(self._shade_seen - self._shade)
         if isnan(place.wall) or not look.even:  # a bob with a pattern shows now this side, now that
             bright = 0.25 < ratio < 4.0
         elif isnan(shade) or self.hidden > 15:
-            bright = 0.5 < ratio / light < 2.0
+            bright = 0.5 < ratio / place.light < 2.0
         else:  # before something of another shade the contrast is another, but the bob is as bright as ever
             clear = abs(ratio) > 0.3 or abs(place.contrast) > 5 * place.misfit
             bright = clear and shade < 0.1 * abs(look.contrast) + 3 * self._shade_scatter
-        misfit = place.misfit / max(light, 1.0)
+        misfit = place.misfit / max(place.light, 1.0)
         return bool(
             bright
             and place.visible >= self._least_visible()

@@ -1,4 +1,4 @@
-"""The picture looked at in a few spots on the bob, and around it: cheap enough for every frame."""
+"""The picture looked at in a few spots on the bob: cheap enough for every frame."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import numpy as np
 
 from toolkit.motion.compiled import address, call, kernel
 from toolkit.trackers.localiser import Patch
-from toolkit.tracking.front import ROUND, WITHIN
+from toolkit.tracking.front import WITHIN
 
-_MODULE, _WHAT = "toolkit.tracking._spots_kernel", "the looks at the bob"
-_ROUND, _WITHIN = (np.array(offsets, order="C") for offsets in (ROUND, WITHIN))
-_ROUND_AT, _WITHIN_AT = address(_ROUND), address(_WITHIN)
+_WITHIN = np.array(WITHIN, order="C")
+_WITHIN_AT = address(_WITHIN)
 
 
 class Told(NamedTuple):
@@ -23,18 +22,6 @@ class Told(NamedTuple):
     seen: int
     tells: int
     bobs: int
-
-
-def level_around(patch: Patch, x_px: float, y_px: float, reach_px: float) -> float:
-    """The background's mean brightness on a circle, as far as the patch reaches; 0 where it does not."""
-    back = patch.back
-    numbers = (c_double * 4)(x_px - patch.x_px, y_px - patch.y_px, reach_px)
-    at = addressof(numbers)
-    call(
-        kernel("level", _MODULE, _WHAT), back.ctypes.data, _ROUND_AT, at, at + 24, ROUND.shape[1], *back.shape,
-        back.strides[0] // 4,
-    )  # fmt: skip
-    return numbers[3]
 
 
 def tell_bob(
@@ -52,8 +39,9 @@ def tell_bob(
     x, y, radius = disc
     numbers = (c_double * 12)(x - patch.x_px, y - patch.y_px, radius, shade, light, least, patch.x_px, patch.y_px)
     at, image = addressof(numbers), patch.image
+    told = kernel("told", "toolkit.tracking._spots_kernel", "the looks at the bob")
     call(
-        kernel("told", _MODULE, _WHAT), image.ctypes.data, _WITHIN_AT, at, at + 64, WITHIN.shape[1], *image.shape,
+        told, image.ctypes.data, _WITHIN_AT, at, at + 64, WITHIN.shape[1], *image.shape,
         image.strides[0] // 4, address(still), 0 if front is None else front.ctypes.data, *still.shape,
     )  # fmt: skip
     whole, seen, tells, bobs = numbers[8:]
