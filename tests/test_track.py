@@ -129,6 +129,27 @@ def test_a_bob_before_a_board_that_is_not_much_brighter(tmp_path):
     assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
 
 
+@pytest.mark.parametrize("behind", [True, False])
+def test_someone_walks_by_after_the_background_was_learned(tmp_path, behind):
+    rng = np.random.default_rng(0)
+    t = np.arange(240) / FPS
+    theta = angles(t)
+    x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
+    left = (100 * (t - 1.8)).round().astype(int)
+    sides = [(max(0, a), max(0, a + 60)) if a < W else None for a in left]
+    how = "board" if behind else "post"
+    film(tmp_path / "by.mp4", (draw(a, b, rng, **{how: side}) for a, b, side in zip(x, y, sides)))
+    found = track(tmp_path / "by.mp4")
+    meets = (x > left - RADIUS) & (x < left + 60 + RADIUS)
+    hidden = (x > left + 4) & (x < left + 60 - 4)
+    assert meets.mean() > 0.15
+    assert found.ok[~meets].mean() > 0.97
+    assert found.ok[meets].mean() > 0.9 if behind else not found.ok[hidden].any()
+    off = np.hypot(found.x_px - x, found.y_px - y)
+    assert off[found.ok].max() < 0.4
+    assert (off / np.hypot(found.sigma_x_px, found.sigma_y_px))[found.ok & meets].max() < 5
+
+
 @pytest.mark.parametrize("kind", ["still", "noise", "passing", "short", "one"])
 def test_what_is_no_pendulum_is_refused(tmp_path, kind):
     rng = np.random.default_rng(3)

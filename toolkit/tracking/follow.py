@@ -13,6 +13,7 @@ from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
 from toolkit.tracking.front import WITHIN, enough_shows, hidden_share
 from toolkit.tracking.learn import Known
 from toolkit.tracking.looks import light_on
+from toolkit.tracking.passer import surroundings
 from toolkit.tracking.repeat import alike, thinned
 from toolkit.tracking.search import find_round_near, silhouette
 from toolkit.tracking.spots import tell_bob
@@ -25,6 +26,11 @@ from toolkit.video import Frame
 _STRING_EVERY, _STRING_DENSE = 3, 180  # frames: so often the string is measured, and for so long; then ever less often
 _SEARCH_EVERY = 4  # hidden frames
 _UNSTEADY_PX = 0.3  # so far places stray from a swing before a camera that a hand holds
+_TELLS = 0.65  # of the bob, or of what is beside it: less than this told from what is behind it shows no bob
+_ODD, _BETTER = (
+    1.3,
+    0.75,
+)  # times the ordinary misfit: with more, something may pass behind; and times that: then it did
 
 
 @dataclass
@@ -115,7 +121,12 @@ class Follower(Known):
         not believed."""
         patch = self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)
-        if patch is None or not self._believe(place, guess):
+        believed = patch is not None and self._believe(place, guess)
+        if patch is not None and (not believed or place.misfit > _ODD * self.ordinary_misfit):
+            other = self._before_passer(patch, place if believed else guess, guess)
+            if other is not None and not (believed and other[0].misfit > _BETTER * place.misfit):
+                (place, patch), believed = other, True
+        if patch is None or not believed:
             found = self._look_around(frame, guess)
             if found is None:
                 return place, None
@@ -128,6 +139,23 @@ class Follower(Known):
     def _locate(self, patch: Patch, guess: Guess) -> Place:
         if not self.look.even:
             return self._locate_uneven(patch, guess)
+    def _before_passer(self, patch: Patch, about: Place | Guess, guess: Guess) -> tuple[Place, Patch] | None:
+        """The place before something that passes behind, and that was not there when the background was learned: as if what is
+        seen about the bob went on behind it. None where that is not believed to be the bob."""
+        found: tuple[Place, Patch] | None = None
+        for _ in range(2):  # the first place may be off by as much as the guess
+            near = guess._replace(x_px=about.x_px, y_px=about.y_px)
+            there = surroundings(patch, self.look_at(near), near)
+            if there is None:
+                return None
+            about = place = self._locate(there, near)
+            # what is of the bob's brightness may as well pass before it
+            told = np.abs(there.back - place.contrast - place.wall) > 4 * place.misfit
+            if not self._believe(place, guess) or np.mean(told) < _TELLS:
+                return None
+            found = place, there
+        return found
+
         if not self.hidden and len(self.recent) == 3:
             place = self.localiser.locate(patch, self.look_at(guess), guess)
             if isfinite(place.x_px):
@@ -274,7 +302,7 @@ class Follower(Known):
         told = tell_bob(patch, self.back.mean, self.front, disc, shade, light, least)  # without the bob's own shadow
         if told is None or told.seen < 8:  # at the picture's rim
             return True
-        return told.tells > 0.65 * told.seen and told.bobs > 0.75 * told.tells
+        return told.tells > _TELLS * told.seen and told.bobs > 0.75 * told.tells
 
     def _unlike(self, patch: Patch, place: Place) -> float:
         """How much of a bob with a pattern differs from what stands still where it is."""
