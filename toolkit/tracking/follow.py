@@ -25,12 +25,10 @@ from toolkit.video import Frame
 
 _STRING_EVERY, _STRING_DENSE = 3, 180  # frames: so often the string is measured, and for so long; then ever less often
 _SEARCH_EVERY = 4  # hidden frames
-_UNSTEADY_PX = 0.3  # so far places stray from a swing before a camera that a hand holds
 _TELLS = 0.65  # of the bob, or of what is beside it: less than this told from what is behind it shows no bob
-_ODD, _BETTER = (
-    1.3,
-    0.75,
-)  # times the ordinary misfit: with more, something may pass behind; and times that: then it did
+_ODD = 1.3  # times the ordinary misfit: with more, something may pass behind the bob
+_BETTER = 0.75  # times that misfit: where less is left, it did
+_UNSTEADY_PX = 0.3  # so far places stray from a swing before a camera that a hand holds
 
 
 @dataclass
@@ -136,9 +134,6 @@ class Follower(Known):
             place, patch = again
         return place, patch if self._stands_out(patch, place) else None
 
-    def _locate(self, patch: Patch, guess: Guess) -> Place:
-        if not self.look.even:
-            return self._locate_uneven(patch, guess)
     def _before_passer(self, patch: Patch, about: Place | Guess, guess: Guess) -> tuple[Place, Patch] | None:
         """The place before something that passes behind, and that was not there when the background was learned: as if what is
         seen about the bob went on behind it. None where that is not believed to be the bob."""
@@ -156,6 +151,9 @@ class Follower(Known):
             found = place, there
         return found
 
+    def _locate(self, patch: Patch, guess: Guess) -> Place:
+        if not self.look.even:
+            return self._locate_uneven(patch, guess)
         if not self.hidden and len(self.recent) == 3:
             place = self.localiser.locate(patch, self.look_at(guess), guess)
             if isfinite(place.x_px):
