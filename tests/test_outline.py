@@ -1,14 +1,15 @@
-"""The pull of the lens on the bob's place, against pictures drawn by counting points within the outline."""
+"""What the string pulls a bob's place by where a lens draws it out, against pictures drawn by counting points within the outline."""
 
 import numpy as np
+import pytest
 from scipy.ndimage import gaussian_filter
 
-from toolkit.trackers.disc import fit_disc, locate
+from toolkit.trackers import disc, edge
+from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.outline import pulled_by_lens
+from toolkit.tracking.outline import pulled_by_string
 from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing
-from toolkit.tracking.view import NAMES, View
 
 K1, RADIUS, FINE = -0.1, 14.0, 8
 MIDDLE = np.array([319.5, 239.5])
@@ -38,42 +39,51 @@ def _picture(x: float, y: float) -> tuple[Patch, Guess]:
     return patch, Guess(x, y, 0.0, 0.0, float(np.arctan2(PIVOT[1] - y, PIVOT[0] - x)))
 
 
-def test_a_bob_drawn_out_by_the_lens_is_put_back_to_its_centre() -> None:
-    values = np.zeros(len(NAMES))
-    values[:10] = *PIVOT, 340.0, 0.0, 30.0, 0.0, 0.0, 0.8, 0.0, 1.0
-    values[NAMES.index("k1")] = K1
-    none = np.zeros((0, len(NAMES)))
-    view = View(values, np.zeros((19, 19)), none, np.zeros(0), ("lens",), (319.5, 239.5), 0.0, 1.0)
-    swing = Swing(values[:9], np.zeros((9, 9)), 0.0, 0.0)
-    t = np.linspace(0, 1.3, 40)
-    x, y = view.position(t, *swing.position(t))
+def _swung() -> tuple[Swing, np.ndarray, np.ndarray, np.ndarray]:
+    """A swing, and times with the places that it has then."""
+    values = np.array([*PIVOT, 340.0, 0.0, 30.0, 0.0, 0.0, 0.8, 0.0])
+    swing, t = Swing(values, np.zeros((9, 9)), 0.0, 0.0), np.linspace(0, 1.3, 60)
+    return swing, t, *swing.position(t)
+
+
+@pytest.mark.parametrize("locate", [disc.locate, edge.locate], ids=["disc", "edge"])
+def test_a_bob_drawn_out_by_the_lens_is_put_back_to_its_centre(locate) -> None:
+    swing, t, x, y = _swung()
     shown = [_picture(float(a), float(b)) for a, b in zip(x, y)]
     slow = np.argsort(np.hypot(*swing.velocity(t)))[:8]
     start = Look(RADIUS, 0.6, -100.0, noise=3.0)
     fits = [fit_disc(shown[k][0], start, shown[k][1], calibrate=True, turns=8) for k in slow]
     table = np.median([fit for fit in fits if fit is not None], axis=0)
     look = start._replace(radius_px=float(table[2]), edge_px=float(table[3]), noise=float(table[7]))
-    off = np.array([locate(patch, look, guess)[:2] for patch, guess in shown]) - np.array([x, y]).T
+    found = np.array([locate(patch, look, guess)[:2] for patch, guess in shown])
+    faced = np.array([locate(patch, look, guess._replace(faces=True))[:2] for patch, guess in shown])
+    off = found - np.array([x, y]).T
 
     sigma = np.full(t.size, 0.05)
-    places = Places(t, x + off[:, 0], y + off[:, 1], sigma, sigma, np.ones(t.size, bool), np.zeros(t.size, bool))
-    left = off - np.array(pulled_by_lens(view, swing, places, lambda _: look, 0.0)).T
-    assert np.sqrt(np.mean(off**2)) > 0.1
-    assert np.sqrt(np.mean(left**2)) < 0.4 * np.sqrt(np.mean(off**2))
+    places = Places(t, *found.T, sigma, sigma, np.ones(t.size, bool), np.zeros(t.size, bool))
+    pulls = {k: tuple(found[k] - faced[k]) for k in range(1, t.size, 2)}
+    left = off - np.array(pulled_by_string(pulls, swing, places)).T
+    along = np.vander(x - PIVOT[0], 4)  # what goes with the place: the rest is how pixels lie in the outline
+    was, is_left = (along @ np.linalg.lstsq(along, both, rcond=None)[0] for both in (off, left))
+    assert np.sqrt(np.mean(was**2)) > 0.1
+    assert np.sqrt(np.mean(is_left**2)) < 0.25 * np.sqrt(np.mean(was**2))
+
+
+def test_what_chance_makes_of_a_round_bob_moves_nothing() -> None:
+    swing, t, x, y = _swung()
+    sigma = np.full(t.size, 0.05)
+    places = Places(t, x, y, sigma, sigma, np.ones(t.size, bool), np.zeros(t.size, bool))
+    chance = np.random.default_rng(1).normal(0, 0.02, (200, t.size, 2))
+    moved = [pulled_by_string({k: tuple(off[k]) for k in range(t.size)}, swing, places) for off in chance]
+    assert np.sqrt(np.mean(np.square(moved))) < 0.003  # fitted as it is, it would be 0.02 √(7/60) = 0.007
 
 
 def test_frames_without_the_bob_are_left_alone() -> None:
-    values = np.zeros(len(NAMES))
-    values[:10] = *PIVOT, 340.0, 0.0, 30.0, 0.0, 0.0, 0.8, 0.0, 1.0
-    values[NAMES.index("k1")] = K1
-    view = View(values, np.zeros((19, 19)), np.zeros((0, 19)), np.zeros(0), ("lens",), (319.5, 239.5), 0.0, 1.0)
-    swing = Swing(values[:9], np.zeros((9, 9)), 0.0, 0.0)
-    t = np.linspace(0, 1.3, 40)
-    x, y = view.position(t, *swing.position(t))
+    swing, t, x, y = _swung()
     good = np.arange(t.size) % 7 != 3
     x, y = np.where(good, x, np.nan), np.where(good, y, np.nan)
     places = Places(t, x, y, 0 * x, 0 * x, good, ~good)
-    off = np.array(pulled_by_lens(view, swing, places, lambda _: Look(RADIUS, 0.6, -100.0, 3.0), 0.0))
-    assert np.isfinite(off).all()
-    assert off[:, good].any(axis=0).all()
+    wild = {k: (0.1, 0.2) if good[k] else (50.0, np.nan) for k in range(t.size)}
+    off = np.array(pulled_by_string(wild, swing, places))
+    np.testing.assert_allclose(off[:, good], [[0.1], [0.2]] * np.ones(good.sum()), atol=1e-6)
     assert not off[:, ~good].any()

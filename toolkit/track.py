@@ -21,7 +21,7 @@ from toolkit.tracking.clock import even_times, late_told, lone_strays, out_of_ti
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.held import held_swing
 from toolkit.tracking.joint import Camera, fit_jointly
-from toolkit.tracking.outline import pulled_by_lens
+from toolkit.tracking.outline import pulled_by_string
 from toolkit.tracking.places import Places
 from toolkit.tracking.scatter import Factors
 from toolkit.tracking.shake import Shake
@@ -238,6 +238,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
         places, swing = shake.checked(places, swing)
     swing = held_swing(swing, places, _strings(record, places, shake, look.radius_px, fps_factor).seen(), size_px)
     require_pendulum(swing, places, size_px, video.path)
+    x_off, y_off = pulled_by_string(record.pull, swing, places)
+    places = replace(places, x_px=places.x_px - x_off, y_px=places.y_px - y_off)
     found, none = places, np.zeros(places.t_s.size, bool)
     untimely, stray = _out_of_step(found, swing, swing.position(places.t_s), none)
     places = found.without(untimely | stray)
@@ -254,10 +256,6 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     left = found.without(untimely | stray)
     if not np.array_equal(left.good, good):
         places, good = left, left.good
-        joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
-    if joint.view is not None and "lens" in joint.view.shown and follower.localiser.name == "disc":
-        x_off, y_off = pulled_by_lens(joint.view, swing, places, follower.look_at, follower.exposure_s)
-        places = replace(places, x_px=places.x_px - x_off, y_px=places.y_px - y_off)
         joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
     log += shake.told(joint.factors.shake_px)
     late_told(places, untimely, log, warnings)

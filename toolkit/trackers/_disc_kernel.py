@@ -56,7 +56,8 @@ loop = njit(**_OPTIONS, fastmath={"reassoc", "contract", "nsz", "arcp"})  # sums
 def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
     """List the pixels about the outline and, if INSIDE, every second one of every second row within it; their number.
 
-    disc : cx, cy, R, h. The string's wedge, left out, is given by its direction and the squared cosine of its half angle;
+    disc : cx, cy, R, h. The string's wedge, left out, is given by its direction and the squared cosine of its half angle,
+    negative where the one opposite is left out too;
     `known` is one over the variance of the wall's level, in units of the noise's.
     """
     image, back, seen = pixels(places, IMAGE), pixels(places, BACK), pixels(places, SEEN)
@@ -64,7 +65,8 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
     x, y, bright = lists, skip(lists, _Y * most), skip(lists, _BRIGHT * most)
     wall, known = skip(lists, _WALL * most), skip(lists, _KNOWN * most)
     cx, cy, radius = disc[0], disc[1], disc[2]
-    sx, sy, wedge = numbers[STRING_X], numbers[STRING_Y], numbers[WEDGE]
+    sx, sy, wedge = numbers[STRING_X], numbers[STRING_Y], abs(numbers[WEDGE])
+    spared = 0.0 if numbers[WEDGE] > 0.0 else -math.inf  # what lies less far along the string
     bx, by = 0.5 * numbers[STREAK_X], 0.5 * numbers[STREAK_Y]
     reach = math.sqrt(bx * bx + by * by)
     band = disc[3] + MARGIN + 0.5 * reach * reach / radius  # a streak's ends leave the tangent
@@ -84,7 +86,7 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
         end = min(math.floor(cx + half) + 1, columns)
         left = min(max(math.ceil(cx - hole), first), end)
         right = min(max(math.ceil(cx + hole), left), end)
-        held = abs(sx) * outer + dy * sy > 0.0  # may the string be in this row?
+        held = abs(sx) * outer + dy * sy > spared  # may the string be in this row?
         for part in range(3):  # the outline, what is within it, the outline
             column, until, step = first, left, 1
             if part == 1:
@@ -100,7 +102,7 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
                 square = dx * dx + dy * dy
                 if held:
                     along = dx * sx + dy * sy
-                    keep &= (along <= 0.0) | (along * along <= wedge * square)
+                    keep &= (along <= spared) | (along * along <= wedge * square)
                 if reach > 0.0:  # across its way the streak is narrow
                     d = math.sqrt(square) + 1e-9
                     off = (d - radius) * d

@@ -95,7 +95,8 @@ def _fit(
     desk.provide(rows * columns)
     string = 0.0, 0.0, 1.0
     if not isnan(guess.string_rad):
-        string = cos(guess.string_rad), sin(guess.string_rad), cos(min(0.9, 0.2 + 3.0 / look.radius_px)) ** 2
+        wedge = cos(min(0.9, 0.2 + 3.0 / look.radius_px)) ** 2
+        string = cos(guess.string_rad), sin(guess.string_rad), -wedge if guess.faces else wedge
     _GIVEN.pack_into(
         desk.numbers, 0, guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften,
         guess.streak_x_px, guess.streak_y_px, *string, look.noise, contrast,

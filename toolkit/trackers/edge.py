@@ -68,8 +68,8 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
     count = int(max(32, 2 * np.pi * look.radius_px / 0.9))
     angles = (np.arange(count) + 0.5) * 2 * np.pi / count
     if np.isfinite(guess.string_rad):
-        half = min(0.9, 0.2 + 3.0 / look.radius_px)
-        angles = angles[np.abs((angles - guess.string_rad + np.pi) % (2 * np.pi) - np.pi) > half]
+        half, turn = min(0.9, 0.2 + 3.0 / look.radius_px), np.pi if guess.faces else 2 * np.pi
+        angles = angles[np.abs((angles - guess.string_rad + turn / 2) % turn - turn / 2) > half]
     ux, uy = np.cos(angles), np.sin(angles)
     streak = np.abs(guess.streak_x_px * ux + guess.streak_y_px * uy)
     wide = max(1.0, look.radius_px / 6)

@@ -45,13 +45,15 @@ class Look(NamedTuple):
 
 class Guess(NamedTuple):
     """Where the bob is expected: centre in the whole frame, the streak (vector) that it draws during the exposure,
-    and the direction from the bob to the string (radians, image axes; NaN if no string is to be expected)."""
+    and the direction from the bob to the string (radians, image axes; NaN if no string is to be expected). Where it `faces` it,
+    the outline is left out as far on the other side of the bob as at the string."""
 
     x_px: float
     y_px: float
     streak_x_px: float = 0.0
     streak_y_px: float = 0.0
     string_rad: float = np.nan
+    faces: bool = False
 
 
 class Place(NamedTuple):
