@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from struct import Struct
 from types import ModuleType
 from typing import Any
 
@@ -116,7 +117,7 @@ def terms(module: ModuleType, name: str = "terms") -> int:
 
 
 @cache
-def kernel(name: str, module: str = "", what: str = "") -> Callable[[int, None, int], int]:
+def kernel(name: str, module: str = "", what: str = "") -> Callable[[Any, None, Any], int]:
     """The function NAME of kernels/NAME.py, or of a `module`, as machine code: (scratch address, None, address of its
     places) -> 0. `what` it is, for who waits."""
 
@@ -161,11 +162,13 @@ def address(array: Any) -> int:
     return ctypes.addressof(ctypes.c_char.from_buffer(array))
 
 
-def call(function: Callable[[int, None, int], int], *addresses: int) -> None:
+_PACKED = [Struct(f"{count}q").pack for count in range(20)]  # of so many addresses
+_NOTHING = ctypes.create_string_buffer(8)  # where kernels put their empty results
+
+
+def call(function: Callable[[Any, None, Any], int], *addresses: int) -> None:
     """Call a kernel with these addresses as its places."""
-    places = (ctypes.c_int64 * (len(addresses) + 1))(*addresses)
-    at = ctypes.addressof(places)
-    function(at + 8 * len(addresses), None, at)
+    function(_NOTHING, None, _PACKED[len(addresses)](*addresses))
 
 
 def machine_code(

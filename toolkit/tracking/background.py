@@ -19,6 +19,8 @@ class Background:
     def __init__(self, shape: tuple[int, int], fill: float = 0.0) -> None:
         self.mean = np.full(shape, fill, np.float32)
         self.seen = np.zeros(shape, np.float32)
+        self._numbers = np.empty(7)
+        self._at = address(self.mean), address(self.seen), address(self._numbers)
 
     def add(
         self,
@@ -35,15 +37,13 @@ class Background:
         fade, so that slow changes of light are followed.
         """
         x0, y0, x1, y1 = box
-        numbers = np.array(_hidden(bob, pivot, gain, most))
-        numbers[:2] -= x0, y0
+        bx, by, *rest = _hidden(bob, pivot, gain, most)
+        self._numbers[:] = bx - x0, by - y0, *rest
         plane = np.ascontiguousarray(plane, np.float32)
-        skipped = 4 * (y0 * self.mean.shape[1] + x0)
+        width, (mean, seen, numbers) = self.mean.shape[1], self._at
+        skipped = 4 * (y0 * width + x0)
         add = kernel("add", "toolkit.tracking._back_kernel", "the background's mean")
-        call(
-            add, plane.ctypes.data, address(self.mean) + skipped, address(self.seen) + skipped, address(numbers),
-            y1 - y0, x1 - x0, plane.shape[1], self.mean.shape[1],
-        )  # fmt: skip
+        call(add, plane.ctypes.data, mean + skipped, seen + skipped, numbers, y1 - y0, x1 - x0, plane.shape[1], width)
 
     def add_all(
         self,

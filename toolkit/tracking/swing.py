@@ -65,10 +65,10 @@ class Swing:
     def angles_at(self, times_s: list[float]) -> tuple[list[float], list[float]]:
         """`angle` at a few times: what is asked on every frame is quicker without arrays."""
         n = len(times_s)
-        room = (c_double * (9 + 3 * n))(*self.values.tolist(), *(t - self.t0_s for t in times_s))
-        lanes = (c_double * LANES)()
-        call(_kernel(), addressof(room), addressof(lanes), n, 1)
-        return room[9 + n : 9 + 2 * n], room[9 + 2 * n :]
+        room = (c_double * (9 + 3 * n + LANES))(*self.values.tolist(), *(t - self.t0_s for t in times_s))
+        at = addressof(room)
+        call(_kernel(), at, at + 8 * (9 + 3 * n), n, 1)
+        return room[9 + n : 9 + 2 * n], room[9 + 2 * n : 9 + 3 * n]
 
     def position(self, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """x, y in px at times t_s."""
