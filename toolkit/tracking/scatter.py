@@ -16,7 +16,7 @@ _COUNT = 3  # frames that tell as much of what changes from frame to frame as on
 # by how much factors are ordinarily larger along the motion than across it (natural logarithm), and its standard deviation
 _MORE, _ALIKE = 0.12, 0.13
 _TURNS = 30
-_LEAST, _USUAL, _MOST = 0.5, 4.0, 10.0  # what a fit's own σ is multiplied by; beyond the last the quick is not its own
+_LEAST, _USUAL, _MOST = 0.2, 4.0, 10.0  # what a fit's own σ is multiplied by; beyond the last the quick is not its own
 
 
 class Factors(NamedTuple):
