@@ -9,8 +9,9 @@ import pytest
 
 from toolkit.calibrate import arc_pivot, calibrate, line_pivot, write_calibration_json
 from toolkit.errors import JobError, UsageError
-from toolkit.track import OK, PREDICTED, track, write_track_csv
+from toolkit.track import OK, PREDICTED, _begin, track, write_track_csv
 from toolkit.tracking.swing import NAMES, fit_circle, fit_swing
+from toolkit.video import open_video
 
 av = pytest.importorskip("av")
 cv2 = pytest.importorskip("cv2")
@@ -127,6 +128,13 @@ def test_a_bob_before_a_board_that_is_not_much_brighter(tmp_path):
     assert found.ok[before].mean() > 0.97
     assert found.ok.mean() > 0.95
     assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
+
+
+def test_how_bright_the_bob_is_is_known_before_the_first_frame_is_followed(plain):
+    follower, _ = _begin(open_video(plain[0]), None, None, None, None, None, None)
+    shade, scatter = follower.ordinary_shade
+    assert shade == pytest.approx(60, abs=1.5)  # as drawn
+    assert scatter < 2
 
 
 @pytest.mark.parametrize("behind", [True, False])

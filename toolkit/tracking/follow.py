@@ -26,6 +26,7 @@ from toolkit.video import Frame
 _STRING_EVERY, _STRING_DENSE = 3, 180  # frames: so often the string is measured, and for so long; then ever less often
 _PULL_EVERY = 3  # frames
 _SEARCH_EVERY = 4  # hidden frames
+_STEADY = 24  # frames over which a bold pattern draws the bob to one side about as often as to the other
 _TELLS = 0.65  # of the bob, or of what is beside it: less than this told from what is behind it shows no bob
 _ODD = 1.3  # times the ordinary misfit: with more, something may pass behind the bob
 _BETTER = 0.75  # times that misfit: where less is left, it did
@@ -64,10 +65,11 @@ class Follower(Known):
         self.astray = 0.0  # how far the bob was from the fitted motion lately, px
         self._fitted_at = 0
         self._shade_seen = np.nan  # the bob's own brightness at the place judged last
-        self._shade = np.nan  # the bob's own brightness lately, and how much it changes
-        self._shade_scatter = 0.03 * abs(rough.look.contrast)
+        # the bob's own brightness lately, and how much it changes
+        self._shade, scatter = self.ordinary_shade
+        self._shade_scatter = max(0.03 * abs(rough.look.contrast), np.nan_to_num(scatter))
         self.first: list[Frame] = []  # the frames read ahead, if they are the first that will be followed
-        self.recent: deque[tuple[float, float, float]] = deque(maxlen=3)
+        self.recent: deque[tuple[float, float, float]] = deque(maxlen=_STEADY if self.bold else 3)
         self._picture: Frame | None = None  # the one that is measured
         # how much of a bob with a pattern differs from what stands still: at the place judged last, and lately
         self._unlike_seen = self._usually_unlike = np.nan
@@ -123,7 +125,7 @@ class Follower(Known):
         patch = self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)
         believed = patch is not None and self._believe(place, guess)
-        if patch is not None and (not believed or place.misfit > _ODD * self.ordinary_misfit):
+        if patch is not None and self.look.even and (not believed or place.misfit > _ODD * self.ordinary_misfit):
             other = self._before_passer(patch, place if believed else guess, guess)
             if other is not None and not (believed and other[0].misfit > _BETTER * place.misfit):
                 (place, patch), believed = other, True
@@ -172,7 +174,7 @@ class Follower(Known):
         localiser, if it agrees, how exactly."""
         look = self.look
         sure = self.localiser.locate(patch, look, guess)
-        if sure.visible >= self._least_visible() and 0.25 < sure.contrast / look.contrast < 4.0:
+        if self.bold or (sure.visible >= self._least_visible() and 0.25 < sure.contrast / look.contrast < 4.0):
             return sure
         found = self._outline_in(patch, 0.45)
         if found is None:
@@ -265,7 +267,7 @@ class Follower(Known):
         self._shade_seen = self._shade_now(place)
         shade = abs(self._shade_seen - self._shade)
         if isnan(place.wall) or not look.even:  # a bob with a pattern shows now this side, now that
-            bright = 0.25 < ratio < 4.0
+            bright = self.bold or 0.25 < ratio < 4.0
         elif isnan(shade) or self.hidden > 15:
             bright = 0.5 < ratio / place.light < 2.0
         else:  # before something of another shade the contrast is another, but the bob is as bright as ever
@@ -337,7 +339,7 @@ class Follower(Known):
             return
         self._refit()
         kept = self.recent, self.hidden, self._picture
-        self.recent = deque(maxlen=3)
+        self.recent = deque(maxlen=kept[0].maxlen)
         for k in reversed(range(len(frames))):
             frame = frames[k]
             if r.ok[k]:
@@ -364,8 +366,8 @@ class Follower(Known):
 
     def _expect(self, t: float) -> tuple[float, float, float, float]:
         """Where the bob should be at time t and how fast, px and px/s: the fitted motion, moved by how far the bob was
-        from it in the last frames."""
-        recent = list(self.recent)[-2:]
+        from it in the last frames, or was on the whole if its pattern draws its place to and fro."""
+        recent = list(self.recent)[0 if self.bold else -2 :]
         if recent and abs(t - self.swing.t0_s) > 1.0:  # start anew from near by, so that no long way is integrated
             self.swing = replace(self.swing, values=self.swing.values_at(recent[-1][0]), t0_s=recent[-1][0])
         v = self.swing.values.tolist()
@@ -380,7 +382,9 @@ class Follower(Known):
             return x, y, vx, vy
         offs = [(r[1] - a, r[2] - b) for r, a, b in zip(recent, xs, ys)]
         (ox, oy), far = offs[-1], t - recent[-1][0]
-        if len(recent) == 2 and not self.hidden and recent[1][0] != recent[0][0]:
+        if self.bold:
+            ox, oy = (sum(part) / len(offs) for part in zip(*offs))
+        elif len(recent) == 2 and not self.hidden and recent[1][0] != recent[0][0]:
             lead = min(1.0, far / (recent[1][0] - recent[0][0]))
             ox, oy = ox + lead * (ox - offs[0][0]), oy + lead * (oy - offs[0][1])
         self.astray = hypot(ox, oy)

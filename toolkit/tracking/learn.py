@@ -12,6 +12,7 @@ from toolkit.trackers import load_tracker, tracker_names
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.tracking.acquire import is_even, scattered
 from toolkit.tracking.background import Background
+from toolkit.tracking.bold import learn_bold
 from toolkit.tracking.front import EVEN, Rhythm, find_front, fit_each, is_clear, typical
 from toolkit.tracking.looks import Looks, Sightings, learn_looks
 from toolkit.tracking.search import still_picture
@@ -25,18 +26,25 @@ from toolkit.video import Frame
 _CHECK_EVERY = 12
 _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
+_WAVERS = 0.02  # of the radius: what strays more from a swing may be a bold pattern's outline, taken for another
+_CALMER = 0.85  # times as far strays a bob that is looked at as it is
+_SHOWS, _HARDLY = (
+    0.6,
+    0.1,
+)  # of the outline, at least, where the bob is said to be found: and of one with a bold pattern
 _LESS = 0.8  # of the misfit: by so much a bob with a pattern is explained better with a shadow
 
 
 class Trial(NamedTuple):
-    """A localiser on the frames read ahead: on how many it finds the bob, the motion fitted to its places, and what misfit and
-    how much of the outline (at two speeds) are ordinary for it."""
+    """A localiser on the frames read ahead: on how many it finds the bob, the motion fitted to its places, and what misfit, how
+    much of the outline (at two speeds) and which brightness of the bob (and scatter of it) are ordinary for it."""
 
     localiser: Localiser
     found: int
     swing: Swing
     misfit: float
     visible: tuple[tuple[float, float], tuple[float, float]]
+    shade: tuple[float, float]
 
     def finds_more_than(self, other: Trial) -> bool:
         """Does it find the bob on more frames, and no less calmly?"""
@@ -77,8 +85,12 @@ class Known:
         self.found = {batch[i].index: p for i, p in points.items()}
         self.ordinary_misfit = self.look.noise
         self.ordinary_visible: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 1.0), (0.85, 0.85))
+        self.ordinary_shade = np.nan, np.nan
         self.choice = ""  # how the localiser was chosen, where there was a choice
-        self.localiser: Localiser = self._choose(batch, points, wanted)
+        self.bold = False  # is some of the bob's pattern like the wall, up to the outline?
+        self.localiser: Localiser = self._choose(
+            batch, points, wanted, rough.look._replace(radius_px=radius or rough.look.radius_px), radius
+        )
 
     def _learn_stillness(self, batch: list[Frame], rough: Rough) -> dict[int, tuple[float, float]]:
         """Does the camera move? Then the points found are put into the first frame's pixels and refitted."""
@@ -243,10 +255,7 @@ class Known:
         self.back, self.sight = before, sight
         return find_shadow(seen, look)
 
-    def _learn_looks(
-        self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]], radius: float | None
-    ) -> Looks:
-        """The looks of the bob at these points; those of `look`, but by its outline alone, where no disc can be fitted."""
+    def _sightings(self, batch: list[Frame], points: dict[int, tuple[float, float]]) -> Sightings:
         numbers = list(points)
         velocity = self.swing.velocity(np.array([batch[i].t_s for i in numbers]))
 
@@ -255,7 +264,13 @@ class Known:
             return guess, self._patch(batch[numbers[k]], look, guess)
 
         x, y = np.array(list(points.values())).T
-        seen = Sightings(x, y, *velocity, show)
+        return Sightings(x, y, *velocity, show)
+
+    def _learn_looks(
+        self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]], radius: float | None
+    ) -> Looks:
+        """The looks of the bob at these points; those of `look`, but by its outline alone, where no disc can be fitted."""
+        seen = self._sightings(batch, points)
         # what else there is beside the bob (a shadow) is fitted too, unless it must stand out as none of it
         strict = look._replace(noise=0.05 * abs(look.contrast) + 1.0)
         found = learn_looks(seen, look, radius, self.interval_s, self.shape)
@@ -265,7 +280,14 @@ class Known:
                 found = other
         return found or Looks(look._replace(even=False))
 
-    def _choose(self, batch: list[Frame], points: dict[int, tuple[float, float]], wanted: str | None) -> Localiser:
+    def _choose(
+        self,
+        batch: list[Frame],
+        points: dict[int, tuple[float, float]],
+        wanted: str | None,
+        rough: Look,
+        radius: float | None,
+    ) -> Localiser:
         """The localiser asked for; else the disc fit where its model holds; else of all there are the one whose model leaves
         least of the picture unexplained (χ²), `choice` says of which. Also learns what is ordinary for it."""
         names = [wanted] if wanted else ["disc"]
@@ -283,8 +305,40 @@ class Known:
             (t for t in tried if t.swing.rms_px < calm and not any(other.finds_more_than(t) for other in tried)),
             key=lambda t: t.misfit * (0.7 if t.localiser.name == "disc" else 1.0),
         )
+        calmest = min(t.swing.rms_px for t in tried)
+        if len(names) > 1 and calmest > _WAVERS * rough.radius_px:
+            best = self._try_bold(batch, points, rough, radius, _CALMER * calmest) or best
         self.swing, self.ordinary_misfit, self.ordinary_visible = best.swing, best.misfit, best.visible
+        self.ordinary_shade = best.shade
         return best.localiser
+
+    def _try_bold(
+        self,
+        batch: list[Frame],
+        points: dict[int, tuple[float, float]],
+        rough: Look,
+        radius: float | None,
+        calm_px: float,
+    ) -> Trial | None:
+        """Its outline as that of a bob with a bold pattern, which is then what is known of the bob: None, and all is as before, where
+        it strays more than so far from a swing."""
+        t_s = np.array([batch[i].t_s for i in points])
+        learned = learn_bold(self._sightings(batch, points), t_s, rough, self.swing, radius)
+        if learned is None:
+            return None
+        before = self.look, self.exposure_s, self.growth, self.swing
+        self.look, self.exposure_s, self.growth, self.bold = learned.look, 0.0, None, True
+        if learned.calm:
+            self.swing = learned.swing
+            points = dict(zip(points, zip(*(c.tolist() for c in self.swing.position(t_s)))))
+        trial = self._try(load_tracker("edge"), batch, points)
+        if trial is None or trial.swing.rms_px > calm_px:
+            self.look, self.exposure_s, self.growth, self.swing = before
+            self.bold = False
+            return None
+        self.found |= {batch[i].index: p for i, p in points.items()}
+        self._learn_background(batch, self.look, points)
+        return trial._replace(visible=((0.0, 1.0), (_HARDLY, _HARDLY)))
 
     def _try(self, localiser: Localiser, batch: list[Frame], points: dict[int, tuple[float, float]]) -> Trial | None:
         """What this localiser makes of the frames on which the bob was found; None where it sees it on too few."""
@@ -295,7 +349,7 @@ class Known:
             patch = self._patch(batch[i], self.look, guess)
             place = NOWHERE if patch is None else localiser.locate(patch, self.look, guess)
             place, _ = self._beside_shadow(localiser, batch[i], guess, place) or (place, patch)
-            if np.isfinite(place.x_px) and place.visible > 0.6:
+            if np.isfinite(place.x_px) and place.visible > (_HARDLY if self.bold else _SHOWS):
                 places[i] = place
         if len(places) < 10 or len(places) <= 0.5 * len(points):
             return None
@@ -311,8 +365,11 @@ class Known:
         if clear.sum() < 10:
             clear[:] = True
         speeds = np.hypot(*swing.velocity(t))
+        ordinary = float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear])
+        shades = np.array([(p.contrast + p.wall) / p.light for p in places.values()])
+        shade = float(np.median(shades))
         return Trial(
-            localiser, len(places), swing, float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear])
+            localiser, len(places), swing, *ordinary, (shade, 1.4826 * float(np.median(np.abs(shades - shade))))
         )
 
     # --- geometry -------------------------------------------------------------------------------------------------
