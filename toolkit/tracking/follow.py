@@ -23,8 +23,7 @@ from toolkit.tracking.swing import CALM, fit_swing, start_swing
 from toolkit.tracking.trail import Rough
 from toolkit.video import Frame
 
-_STRING_EVERY, _STRING_DENSE = 3, 180  # frames: so often the string is measured, and for so long; then ever less often
-_PULL_EVERY = 3  # frames
+_STRING_EVERY, _STRING_DENSE = 3, 180  # frames: so often the string and its pull are measured, and for so long; then ever less often
 _SEARCH_EVERY = 4  # hidden frames
 _STEADY = 24  # frames over which a bold pattern draws the bob to one side about as often as to the other
 _TELLS = 0.65  # of the bob, or of what is beside it: less than this told from what is behind it shows no bob
@@ -102,9 +101,11 @@ class Follower(Known):
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:
                 self._refit()
             self._update_background(patch, place, guess)
-            self._measure_pull(patch, place, guess)
             count = len(r.index)
-            if self.unsteady or count % (_STRING_EVERY * (1 + count // _STRING_DENSE)) == 1:
+            every = _STRING_EVERY * (1 + count // _STRING_DENSE)
+            if count % every == 0 and not isnan(guess.string_rad):
+                r.pull[count - 1] = self._pull(patch, place, guess)
+            if self.unsteady or count % every == 1:
                 self._measure_string(frame, place, shift)
         elif not repeated:
             self.hidden += 1
@@ -419,14 +420,12 @@ class Follower(Known):
         box = (x0, y0, x0 + columns, y0 + rows)
         self.back.add(patch.image, box, self._dark(place.x_px, place.y_px, keep_out), self.pivot or self.swing.pivot_px)
 
-    def _measure_pull(self, patch: Patch, place: Place, guess: Guess) -> None:
-        """How far from where it is found with as much left out opposite the string: an outline that is no circle (a lens, a
+    def _pull(self, patch: Patch, place: Place, guess: Guess) -> tuple[float, float]:
+        """How far it is from where it is found with as much left out opposite the string: an outline that is no circle (a lens, a
         near camera, a rolling shutter), or one of another size, pulls only what sees more of it on one side."""
-        count = len(self.record.index)
-        if count % _PULL_EVERY == 0 and not isnan(guess.string_rad):
-            near = guess._replace(x_px=place.x_px, y_px=place.y_px, faces=True)
-            even = self.localiser.locate(patch, self.look_at(near), near)
-            self.record.pull[count - 1] = place.x_px - even.x_px, place.y_px - even.y_px
+        near = guess._replace(x_px=place.x_px, y_px=place.y_px, faces=True)
+        even = self.localiser.locate(patch, self.look_at(near), near)
+        return place.x_px - even.x_px, place.y_px - even.y_px
 
     def _measure_string(self, frame: Frame, place: Place, shift: CameraShift) -> None:
         px, py = self.pivot or self.swing.pivot_px
