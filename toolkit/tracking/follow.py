@@ -23,7 +23,8 @@ from toolkit.tracking.swing import CALM, fit_swing, start_swing
 from toolkit.tracking.trail import Rough
 from toolkit.video import Frame
 
-_STRING_EVERY, _STRING_DENSE = 3, 180  # frames: so often the string and its pull are measured, and for so long; then ever less often
+# frames: so often the string, and its pull on the bob's place, are measured, and for so long; then ever less often
+_STRING_EVERY, _STRING_DENSE = 3, 180
 _SEARCH_EVERY = 4  # hidden frames
 _STEADY = 24  # frames over which a bold pattern draws the bob to one side about as often as to the other
 _TELLS = 0.65  # of the bob, or of what is beside it: less than this told from what is behind it shows no bob
