@@ -11,6 +11,8 @@ from toolkit.tracking.acquire import REMEDY
 from toolkit.tracking.places import Places
 from toolkit.tracking.swing import CALM, NAMES, Swing, fit_swing, start_swing
 
+_LED = 0.1  # of the way across the picture: a motion that is no farther from the places leads there
+
 
 def whole_swing(followed: Swing, places: Places, path: Path) -> Swing:
     """The motion over the whole clip, from the one followed (on the places' clock); where that does not lead there, from
@@ -33,11 +35,16 @@ def whole_swing(followed: Swing, places: Places, path: Path) -> Swing:
 
 
 def _grown(values: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> Swing | None:
-    """The motion through the `chosen` frames, fitted in growing pieces, so that no swing is lost count of."""
+    """The motion through the `chosen` frames, fitted in growing pieces, at least as far as the last one's motion leads, so that no
+    swing is lost count of."""
     swing: Swing | None = None
     period = 2 * np.pi / np.sqrt(max(values[4], 1e-9))
     stop = t[chosen[0]] + max(0.75 * period, 0.3)
+    at_most = _LED * float(np.hypot(np.ptp(x[chosen]), np.ptp(y[chosen])))
     while True:
+        mx, my = Swing(values, np.zeros((9, 9)), t[chosen[0]], 0.0).position(t[chosen])
+        astray = chosen[~(np.hypot(mx - x[chosen], my - y[chosen]) < at_most)]
+        stop = max(stop, t[astray[0]] if astray.size else t[-1])
         whole = stop >= t[-1]
         part = chosen[t[chosen] <= stop]
         if part.size >= 12:
