@@ -7,6 +7,7 @@ import pytest
 
 from toolkit.errors import UsageError
 from toolkit.trackers import load_tracker, tracker_names
+from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
 
 WALL, BOB, RADIUS, NOISE = 180.0, 60.0, 14.0, 2.0
@@ -130,10 +131,27 @@ def test_what_is_drawn_on_the_bob_does_not_count_where_it_is_not_even():
     assert errors[1] < 0.002 < errors[0]
 
 
+@pytest.mark.parametrize("soften", [1.0, 2.5])
+@pytest.mark.parametrize("brighter", [True, False])
+def test_a_disc_of_which_no_shade_and_no_noise_is_known_is_found_from_afar(brighter, soften):
+    dark = blurred_disc(28.0, 28.0, 0.8)
+    image = (2 * WALL - dark if brighter else dark) + np.random.default_rng(2).normal(0, NOISE, dark.shape)
+    for off_x, off_y in ((0.5, -0.3), (-1.5, 1.0), (1.2 * soften, 1.2 * soften)):
+        fit = fit_disc(
+            patch_of(image.astype(np.float32)),
+            Look(RADIUS, 0.8),
+            Guess(328 + off_x, 528 + off_y),
+            turns=12,
+            soften=soften,
+        )
+        assert fit is not None
+        assert np.hypot(fit[0] - 28, fit[1] - 28) < 0.1
+        assert fit[9] == pytest.approx(WALL - BOB if brighter else BOB - WALL, rel=0.2)
+
+
 @pytest.mark.parametrize("streak", [(0.0, 0.0), (6.0, 2.0), (11.0, -4.0)])
 def test_the_disc_model_is_the_mean_of_discs_along_the_streak(streak):
     """Without noise, the fit of a disc averaged over many instants leaves next to nothing, and finds its radius and edge."""
-    from toolkit.trackers.disc import fit_disc
 
     sigma = 0.9
     instants = (np.arange(200) + 0.5) / 200 - 0.5
@@ -149,7 +167,6 @@ def test_the_disc_model_is_the_mean_of_discs_along_the_streak(streak):
 
 
 def test_pictures_of_any_layout_give_the_same_place():
-    from toolkit.trackers.disc import fit_disc
 
     image = blurred_disc(28.3, 27.6, 0.9)
     patch, look, guess = patch_of(image), Look(RADIUS, 0.9, BOB - WALL, 1.0), Guess(328.4, 527.4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +17,25 @@ SIZE_PX = (640, 480)
 TIMES = np.arange(180) / 30.0
 
 
-def judge(omega2=20.0, length=400.0, theta0=0.3, rate0=0.0, gamma=0.01, seen=None):
-    """Refused or not: a bob that goes exactly as the fitted motion says, seen on the frames `seen`."""
+def judge(omega2=20.0, length=400.0, theta0=0.3, rate0=0.0, gamma=0.01, seen=None, strays=0.0, misfit=0.0):
+    """Refused or not: a bob that strays so far (of its swing) from the fitted motion, seen on the frames `seen`."""
     values = np.array([320.0, 20.0, length, 0.0, omega2, gamma, 0.0, theta0, rate0])
     swing = Swing(values, np.zeros((9, 9)), 0.0, 0.02)
     x, y = swing.position(TIMES)
     good = np.ones(TIMES.size, bool) if seen is None else seen
     sigma = np.full(TIMES.size, 0.02)
-    require_pendulum(swing, Places(TIMES, x, y, sigma, sigma, good, ~good), SIZE_PX, Path("clip.mp4"))
+    places = Places(TIMES, x, y, sigma, sigma, good, ~good)
+    off_px = strays * places.extent_px
+    off = np.random.default_rng(1).normal(0, off_px, (2, TIMES.size))
+    swing, places = replace(swing, rms_px=0.02 + off_px), replace(places, x_px=x + off[0], y_px=y + off[1])
+    require_pendulum(swing, places, SIZE_PX, Path("clip.mp4"), misfit)
+
+
+def test_what_does_not_look_like_a_bob_has_to_swing_the_better():
+    judge(strays=0.05, misfit=0.1)  # a hand held the camera
+    judge(strays=0.03, misfit=0.5)
+    with pytest.raises(JobError, match="strays"):
+        judge(strays=0.05, misfit=0.5)
 
 
 @pytest.mark.parametrize(

@@ -436,8 +436,8 @@ def fit(places: Any) -> None:
         settled = still or free == 8 or (damp == 1.0 and size < 0.3)
         clean = 0.12 * abs(shade[0] - shade[3] * level)
         clean = clean if clean > 5.0 * noise else 5.0 * noise
-        sure = cut < math.inf or (noise == math.inf and turn >= first)  # where noise is not known, no pixel is left out
-        if still and (sure or (free == 6 and largest(skip(lists, _REST * most), count) <= clean)):
+        sure = cut < math.inf or noise == math.inf  # where noise is not known, no pixel is left out
+        if turn >= first and still and (sure or (free == 6 and largest(skip(lists, _REST * most), count) <= clean)):
             break  # at once only where what is judged below would be no better after another turn
         if turn >= first:
             cut = 0.25 * abs(shade[0] - shade[3] * level)

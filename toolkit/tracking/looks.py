@@ -12,6 +12,7 @@ from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
 
 _SURE, _GROWN_PX = 6.0, 0.4  # standard deviations, and over the whole swing: so much the bob grows where it nears
+_BESIDE = 0.4  # of the radius: so far from where the bob was seen it is not
 _MANY = 4000  # pixels of a patch: a part of more tells its light as well
 # what `fit_disc` gives
 _RADIUS, _EDGE, _MISFIT, _VISIBLE, _CONTRAST, _WITHIN = 2, 3, 7, 8, 9, 13
@@ -33,12 +34,15 @@ class Sightings:
         return self._fit(k, look, (float(self.x_px[k]), float(self.y_px[k])), streak_s, how)
 
     def fit_from_far(self, k: int, look: Look, streak_s: float) -> np.ndarray | None:
-        """`fit`; and where this sees no outline, once more from where a soft edge, which reaches farther, finds it."""
+        """`fit`; and where this sees no outline, once more from where a soft edge, which reaches farther, finds it; but not from beside
+        the bob: a long streak is as faint as the wall's texture."""
         out = self.fit(k, look, streak_s, turns=6)
         if out is not None and out[_VISIBLE] > 0.5:
             return out
         soft = self.fit(k, look._replace(noise=np.inf), streak_s, turns=12, soften=2.5)
-        return None if soft is None else self._fit(k, look, (soft[0], soft[1]), streak_s, {"turns": 6})
+        if soft is None or np.hypot(soft[0] - self.x_px[k], soft[1] - self.y_px[k]) > _BESIDE * look.radius_px:
+            return None
+        return self._fit(k, look, (soft[0], soft[1]), streak_s, {"turns": 6})
 
     def _fit(
         self, k: int, look: Look, centre: tuple[float, float], streak_s: float, how: dict[str, float]

@@ -14,6 +14,7 @@ from toolkit.tracking.places import Places
 from toolkit.tracking.swing import Swing
 
 _POOR_PICTURE = 0.12  # of the contrast
+_UNLIKE = 0.25  # of the contrast: with more left unexplained the picture does not speak for a bob
 _STRAYS_PX = 0.1  # less does not stray, whatever its error bar
 _STRAYS = 0.04  # of the bob's radius: more does
 _ROLLS = 0.1  # of the bob's radius: what strays less may be the roll of a camera that a hand is known to hold
@@ -23,8 +24,9 @@ _STRETCH = 3.0  # periods
 _UNEVEN_PX = 0.15  # by so much the places of an uneven bob may stray, unmentioned
 
 
-def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], path: Path) -> None:
-    """Raises JobError where what was followed in a picture of `size_px` does not move like a pendulum."""
+def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], path: Path, misfit: float = 0.0) -> None:
+    """Raises JobError where what was followed in a picture of `size_px` does not move like a pendulum. `misfit` is the share of its
+    contrast that is not explained: what does not look like a bob either has to swing the better."""
     t, good, extent = places.t_s, places.good, places.extent_px
     span = float(t[good][-1] - t[good][0])
     half = 0.5 * swing.period_s
@@ -37,7 +39,8 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
     if span <= half / _ENDLESS or not 0 < amplitude < np.pi:
         reasons.append("it does not turn back")
     straight = swing.length_px > STRAIGHT * np.hypot(*size_px)
-    shaky = 0.06 if good.mean() > 0.95 else 0.04  # a hand-held camera before a plain wall: told as a warning
+    clear = good.mean() > 0.95 and misfit < _UNLIKE
+    shaky = 0.06 if clear else 0.04  # a hand-held camera before a plain wall: told as a warning
     strays = swing.rms_px > max(shaky * extent, 0.3)
     seldom = good.mean() < 0.6 and swing.rms_px > 0.015 * extent
     if (straight or strays or seldom) and swing.values[4] > 0 and _is_ellipse(swing, places):
