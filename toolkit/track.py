@@ -243,7 +243,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     if shake.taken:
         places, swing = shake.checked(places, swing)
     swing = held_swing(swing, places, _strings(record, places, shake, look.radius_px, fps_factor).seen(), size_px)
-    require_pendulum(swing, places, size_px, video.path)
+    misfit = float(np.median([p.misfit for p, g in zip(record.place, places.good) if g])) / max(abs(look.contrast), 1.0)
+    require_pendulum(swing, places, size_px, video.path, misfit)
     x_off, y_off = pulled_by_string(record.pull, swing, places)
     places = replace(places, x_px=places.x_px - x_off, y_px=places.y_px - y_off)
     found, none = places, np.zeros(places.t_s.size, bool)
@@ -251,7 +252,6 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     places = found.without(untimely | stray)
 
     good = places.good
-    misfit = float(np.median([p.misfit for p, g in zip(record.place, good) if g])) / max(abs(look.contrast), 1.0)
     off_px = misfit * look.radius_px / 3
     strings = _strings(record, places, shake, look.radius_px, fps_factor)
     camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor, look.even)
