@@ -300,10 +300,11 @@ class Known:
             self.choice = _told_choice(tried, abs(self.look.contrast))
         # whatever it explains, what leaps about was not found; what errs alike on all frames does not leap
         calm = 2.0 * min(t.swing.rms_px for t in tried) + max(0.05, 0.01 * self.look.radius_px)
-        # a model with more freedom leaves less of any picture
+        # a model with more freedom leaves less of any picture; what an outline that is no circle leaves hardly moves a bob of one shade
+        less = 0.0 if self.look.even else 0.7
         best = min(
             (t for t in tried if t.swing.rms_px < calm and not any(other.finds_more_than(t) for other in tried)),
-            key=lambda t: t.misfit * (0.7 if t.localiser.name == "disc" else 1.0),
+            key=lambda t: t.misfit * (less if t.localiser.name == "disc" else 1.0),
         )
         calmest = min(t.swing.rms_px for t in tried)
         if len(names) > 1 and calmest > _WAVERS * rough.radius_px:
