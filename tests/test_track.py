@@ -10,6 +10,8 @@ import pytest
 from toolkit.calibrate import arc_pivot, calibrate, line_pivot, write_calibration_json
 from toolkit.errors import JobError, UsageError
 from toolkit.track import OK, PREDICTED, _begin, track, write_track_csv
+from toolkit.tracking.hands import held_still
+from toolkit.tracking.places import Places
 from toolkit.tracking.swing import NAMES, fit_circle, fit_swing
 from toolkit.video import open_video
 
@@ -128,6 +130,33 @@ def test_a_bob_before_a_board_that_is_not_much_brighter(tmp_path):
     assert found.ok[before].mean() > 0.97
     assert found.ok.mean() > 0.95
     assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
+
+
+def test_a_hand_holds_the_bob_before_its_release_and_catches_it(tmp_path):
+    rng = np.random.default_rng(0)
+    t = np.arange(250) / FPS
+    theta = np.interp(t - 0.6, t[:181], angles(t[:181]))
+    x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
+    film(tmp_path / "held.mp4", (draw(a, b, rng) for a, b in zip(x, y)))
+    found = track(tmp_path / "held.mp4")
+    swings = (t > 0.7) & (t < 3.55)
+    assert found.ok[swings].all()
+    assert not found.ok[(t < 0.6) | (t > 3.65)].any()
+    assert np.hypot(*np.subtract(found.pivot_px, PIVOT)) < 2
+    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.3
+    assert "track.held_still" in [getattr(line, "key", "") for line in found.meta["log"]]
+    assert not found.meta["warnings"]
+
+
+def test_a_swing_that_dies_away_is_not_held():
+    t = np.arange(1200) / 60
+    rng = np.random.default_rng(1)
+    theta = 0.3 * np.exp(-0.5 * t) * np.cos(5 * t)
+    x, y = (p + rng.normal(0, 0.05, t.size) for p in (160 + 230 * np.sin(theta), 230 * np.cos(theta)))
+    one = np.full(t.size, 0.05)
+    places = Places(t, x, y, one, one, np.ones(t.size, bool), np.zeros(t.size, bool))
+    assert np.ptp(x[-120:]) < 1  # it stands still at last
+    assert held_still(places, []) is places
 
 
 def test_how_bright_the_bob_is_is_known_before_the_first_frame_is_followed(plain):

@@ -20,6 +20,7 @@ from toolkit.trackers import load_tracker
 from toolkit.tracking.acquire import REMEDY, find_bob
 from toolkit.tracking.clock import even_times, late_told, lone_strays, out_of_time, slips_told, strays_told, timed_swing
 from toolkit.tracking.follow import Follower, Record
+from toolkit.tracking.hands import held_still
 from toolkit.tracking.held import held_swing
 from toolkit.tracking.joint import Camera, fit_jointly
 from toolkit.tracking.outline import pulled_by_string
@@ -236,7 +237,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     if follower.unsteady:
         shake.look_at_string(places, _strings(record, places, shake, look.radius_px, fps_factor))
     places = replace(places, x_px=places.x_px + shake.raw_x - shake.x, y_px=places.y_px + shake.raw_y - shake.y)
-    stamps = places.t_s
+    places, stamps = held_still(places, log), places.t_s
 
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
     places, swing = timed_swing(followed, places, video.path, warnings)
