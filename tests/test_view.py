@@ -54,7 +54,7 @@ def strings(studio, t, rng):
     """Straight lines fitted to the string as the picture shows it, bent by lens and shutter as that may be."""
     fitted = []
     for when in t:
-        (x, y), _ = (a.T for a in studio._see(np.linspace(0.05, 0.9, 60), np.full(60, when)))
+        (x, y), _ = (a.T for a in studio._optics.see(np.linspace(0.05, 0.9, 60), np.full(60, when)))
         slope, x0 = np.polyfit(y, x, 1)
         middle = 0.5 * (y[0] + y[-1])
         half = 0.5 * np.hypot(x[-1] - x[0], y[-1] - y[0])

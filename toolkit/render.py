@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from toolkit.camera import check_parameters, load_effect
+from toolkit.camera.optics import Optics
 from toolkit.camera.shoot import Patch, Shoot, View
 from toolkit.errors import UsageError
 from toolkit.output import whole_folder
@@ -130,16 +131,6 @@ def _chance(seed: int, name: str, number: int = 0) -> np.random.Generator:
     return np.random.default_rng([abs(int(seed)), int(seed) < 0, zlib.crc32(name.encode()), number])
 
 
-class Outlines(NamedTuple):
-    """A ball's outline in the picture at k moments, see `cover_disc`; and its light: the centre (k, 2) and the radius (k,) of
-    a disc of its area."""
-
-    shapes: np.ndarray
-    rests: np.ndarray | None
-    light_px: np.ndarray
-    radii_px: np.ndarray
-
-
 class Exposure(NamedTuple):
     """The k moments that stand for one exposure: the images of the ball's centre (k, 2), its outlines (`cover_disc`), and
     when (k,) in s."""
@@ -156,106 +147,11 @@ class Studio:
     def __init__(self, scene: Scene, shoot: Shoot) -> None:
         self.shoot = shoot
         self._theta = _Motion(scene, shoot)
+        self._optics = Optics(shoot, self._theta)
         self._plan_exposures()
         self._backdrop: np.ndarray | None = None
         self._falloff: np.ndarray | None = None
         self._noise: np.ndarray | None = None
-
-    # --- geometry: from scene metres to picture pixels -----------------------------------------------------------
-
-    def _project(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pixels (…, 2) before the lens bends them, and pixels a metre (…) there, of scene points (…, 3) in m."""
-        shoot = self.shoot
-        if shoot.distance_m is None:
-            return np.array(shoot.pivot_px) + shoot.px_per_m * xyz[..., :2], np.full(xyz.shape[:-1], shoot.px_per_m)
-        seen = self._from_camera(xyz, shoot.distance_m)
-        scale = shoot.px_per_m * shoot.distance_m / seen[..., 2]
-        return shoot.middle_px + scale[..., None] * seen[..., :2], scale
-
-    def _from_camera(self, xyz: np.ndarray, distance_m: float) -> np.ndarray:
-        """The same points in m as a camera sees them from `distance_m`: right, down, ahead."""
-        shoot = self.shoot
-        aim = np.append((shoot.middle_px - np.array(shoot.pivot_px)) / shoot.px_per_m, 0.0)
-        seen = (xyz - aim) @ _turn(shoot.yaw_rad, shoot.pitch_rad, shoot.roll_rad).T + [0.0, 0.0, distance_m]
-        seen[..., 2] = np.maximum(seen[..., 2], 1e-6)
-        return seen
-
-    def _bend(self, points: np.ndarray, t_s: np.ndarray) -> np.ndarray:
-        """The same points after lens and hand shake at times t_s (…)."""
-        for bend in self.shoot.lens:
-            points = bend(points)
-        return self._shaken(points, t_s)
-
-    def _shaken(self, points: np.ndarray, t_s: np.ndarray) -> np.ndarray:
-        for shake in self.shoot.shake:
-            dx, dy, roll = shake(np.asarray(t_s))
-            offset = points - self.shoot.middle_px
-            c, s = np.cos(roll), np.sin(roll)
-            turned = np.stack(
-                [c * offset[..., 0] - s * offset[..., 1], s * offset[..., 0] + c * offset[..., 1]], axis=-1
-            )
-            points = self.shoot.middle_px + turned + np.stack([dx, dy], axis=-1)
-        return points
-
-    def _world(self, along: np.ndarray, t_s: np.ndarray) -> np.ndarray:
-        """Scene points (…, 3) in m on the string: along = 0 the pivot, 1 the bob's centre, at times t_s (…)."""
-        theta = self._theta(t_s)
-        xyz = self.shoot.length_m * np.stack([np.sin(theta), np.cos(theta), np.zeros_like(theta)], axis=-1)
-        for sway in self.shoot.sway:
-            xyz = sway(t_s, xyz)
-        return xyz * along[..., None]
-
-    def _see(self, along: np.ndarray, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the picture shows those points, and when: each at the moment at which its own row is exposed."""
-        along, t_s = np.broadcast_arrays(np.asarray(along, float), np.asarray(t_s, float))
-        when = t_s
-        points = self._bend(self._project(self._world(along, when))[0], when)
-        if self.shoot.readout_s:
-            for _ in range(8):
-                when = t_s + self.shoot.row_delay_s(points[..., 1])
-                points = self._bend(self._project(self._world(along, when))[0], when)
-        return points, when
-
-    def _outlines(self, centres: np.ndarray, when: np.ndarray) -> Outlines:
-        """The ball's outline at times `when` (k,), the image of its centre being at `centres` (k, 2).
-
-        Before the lens it is a circle; lens and shake act by their Jacobian, the rolling shutter by the shear
-        d -> d − v τ d_y of a disc that moves at v px/s while rows are τ s apart. What a lens or a near camera add to this
-        first order is in `rests`, and moves the light beside the image of the centre.
-        """
-        from toolkit.camera.outline import bent_shapes, centre_of_light, seen_ball
-
-        shoot, ones = self.shoot, np.ones_like(when)
-        flat, scale = self._project(self._world(ones, when))
-        radius = shoot.radius_m * scale
-        step = 0.5
-        columns = [
-            (self._bend(flat + step * axis, when) - self._bend(flat - step * axis, when)) / (2 * step)
-            for axis in np.eye(2)
-        ]
-        shapes = np.linalg.inv(np.stack(columns, axis=-1) * radius[:, None, None])
-        shear = np.broadcast_to(np.eye(2), shapes.shape).copy()
-        if shoot.readout_s:
-            dt = 1e-5
-            before, after = (self._bend(self._project(self._world(ones, w))[0], w) for w in (when - dt, when + dt))
-            speed = (after - before) / (2 * dt)
-            shear[:, :, 1] -= speed * (shoot.readout_s / shoot.height_px)
-            shapes = shapes @ shear
-        if shoot.distance_m is None and not shoot.lens:
-            return Outlines(shapes, None, centres, 1 / np.sqrt(np.abs(np.linalg.det(shapes))))
-        middle, spread = flat, radius[:, None, None] * np.eye(2)
-        if shoot.distance_m is not None:
-            seen = self._from_camera(self._world(ones, when), shoot.distance_m)
-            middle, spread = seen_ball(seen, shoot.radius_m, shoot.px_per_m * shoot.distance_m)
-            middle = shoot.middle_px + middle
-        unrolled = np.swapaxes(np.linalg.inv(shear), 1, 2)
-        straight = self._bend(flat, when)[:, None]
-
-        def bend(points: np.ndarray) -> np.ndarray:
-            return centres[:, None] + (self._bend(points, when[:, None]) - straight) @ unrolled
-
-        light, radii = centre_of_light(bend, middle, spread)
-        return Outlines(shapes, bent_shapes(bend, flat, shapes, middle, spread), light, radii)
 
     # --- the exposures and the truth -----------------------------------------------------------------------------
 
@@ -266,7 +162,7 @@ class Studio:
         self.sigma_px = edge_sigma(shoot.edge_sigma_px)
         captured, self._take = np.unique(shoot.captured_s, return_inverse=True)  # a repeated frame is one exposure
         half = shoot.exposure_s / 2
-        ends = [self._see(np.ones(captured.size), captured + dt)[0] for dt in (-half, 0, half)]
+        ends = [self._optics.see(np.ones(captured.size), captured + dt)[0] for dt in (-half, 0, half)]
         paths = np.hypot(*(ends[1] - ends[0]).T) + np.hypot(*(ends[2] - ends[1]).T)
         fewest = 8 if shoot.exposure_s > 0 else 1  # at a turning point the path is short but the mean still shifts
         self.exposures: list[Exposure] = []
@@ -274,10 +170,10 @@ class Studio:
         for t, path in zip(captured, paths):
             k = max(fewest, math.ceil(path / (0.8 * self.sigma_px)))
             moments = t + shoot.exposure_s * ((np.arange(k) + 0.5) / k - 0.5)
-            centres, when = self._see(np.ones(k), moments)
-            shapes, rests, light, radii = self._outlines(centres, when)
+            centres, when = self._optics.see(np.ones(k), moments)
+            shapes, rests, light, radii = self._optics.outlines(centres, when)
             self.exposures.append(Exposure(centres, shapes, when, rests))
-            pivot = self._see(np.zeros(1), np.array([t]))[0][0]
+            pivot = self._optics.see(np.zeros(1), np.array([t]))[0][0]
             rows.append((t + float(shoot.row_delay_s(light[:, 1].mean())), *light.mean(axis=0), radii.mean(), *pivot))
         t_s, x, y, radius, pivot_x, pivot_y = np.array(rows)[self._take].T
         theta = self._theta(t_s)
@@ -308,7 +204,7 @@ class Studio:
         )
 
     def _place(self, t_s: float) -> Callable[[np.ndarray], np.ndarray]:
-        return lambda points: self._shaken(np.asarray(points, dtype=float), np.asarray(t_s))
+        return lambda points: self._optics.shaken(np.asarray(points, dtype=float), np.asarray(t_s))
 
     def _visible(self, number: int) -> float:
         """Fraction of the bob's light that reaches the picture: inside it and before nothing (front patches)."""
@@ -368,7 +264,9 @@ class Studio:
             lay(image, patch, self._light(patch.rgb))
         if shoot.string_width_px > 0:
             along, half = np.linspace(0, 1, _STRING_POINTS), shoot.exposure_s / 2
-            start, middle, end = (self._see(along, np.full(along.size, view.t_s + dt))[0] for dt in (-half, 0, half))
+            start, middle, end = (
+                self._optics.see(along, np.full(along.size, view.t_s + dt))[0] for dt in (-half, 0, half)
+            )
             lay_line(image, middle, end - start, shoot.string_width_px, self.sigma_px, self._light(shoot.string_rgb))
         centres, shapes, when, rests = self.exposures[number]
         colours = None
@@ -459,12 +357,3 @@ class _Motion:
         rise = theta[i + 1] - theta[i]
         a, b = omega[i] - rise, rise - omega[i + 1]
         return theta[i] + s * (rise + (1 - s) * ((1 - s) * a + s * b))
-
-
-def _turn(yaw: float, pitch: float, roll: float) -> np.ndarray:
-    """(3, 3) from scene axes (x right, y down, z away) to those of a camera turned by yaw, then pitch, then roll."""
-    cy, sy, cp, sp, cr, sr = (f(a) for a in (yaw, pitch, roll) for f in (math.cos, math.sin))
-    about_y = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]])
-    about_x = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]])
-    about_z = np.array([[cr, sr, 0], [-sr, cr, 0], [0, 0, 1]])
-    return about_z @ about_x @ about_y

@@ -17,7 +17,7 @@ from toolkit.registry import did_you_mean, load_part, part_names
 if TYPE_CHECKING:
     from toolkit.camera.effect import CameraEffect, Parameter
 
-_NOT_EFFECTS = frozenset({"effect", "film", "outline", "paint", "shoot"})
+_NOT_EFFECTS = frozenset({"effect", "film", "optics", "outline", "paint", "shoot"})
 
 
 def effect_names() -> tuple[str, ...]:
