@@ -8,7 +8,8 @@ from toolkit.trackers.localiser import Guess, Look, Patch
 from toolkit.tracking.looks import light_on
 
 _BESIDE = 3.0  # times the edge's width, and two pixels more, from the outline: so far out nothing of the bob is seen
-_OTHER, _SOME = 0.2, 0.08  # of the bob's contrast: by so much it differs from the background learned, on so much of what is beside the bob
+# of the bob's contrast: by so much it differs from the background learned; and on so much of what is beside the bob
+_OTHER, _SOME = 0.2, 0.08
 
 
 def surroundings(patch: Patch, look: Look, guess: Guess) -> Patch | None:
