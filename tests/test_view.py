@@ -71,6 +71,19 @@ def errors(view, truth, places):
     return factor - 1, scale_u, float(np.std(theta - zero - factor * truth.theta_rad))
 
 
+@pytest.mark.parametrize("off_px", [0.3, -0.3])
+def test_a_pattern_that_turns_as_often_as_the_bob_swings_is_no_view(off_px):
+    """Its error returns with the place, and hides in tilt and lens: only what is known of the bob's looks tells of it."""
+    _, truth, (t, x, y) = seen(0.75, string=False)
+    turned = np.unwrap(np.arctan2(np.gradient(truth.theta_rad, t) / 4.0, truth.theta_rad))
+    x, y = x + off_px * np.cos(2 * turned), y + off_px * np.sin(2 * turned)
+    sigma = np.full(t.size, 0.06)
+    view = fit_view(t, x, y, sigma, sigma, start_swing(t, x, y), (640, 480), bent_px=0.15)
+    off, u, _ = errors(view, truth, (t, x, y))
+    assert view.shown == ()
+    assert abs(off) < min(1e-3, 2 * u)
+
+
 def test_a_square_view_is_left_alone():
     view, truth, places = seen()
     assert view.shown == ()

@@ -16,6 +16,7 @@ from toolkit.tracking.view_fit import Lines, fit_view
 _VIEWS = 4  # at most
 # times as far as the places may be off: so far a localiser may err for long, on a bob of one shade or of more
 _EVEN, _UNEVEN = 0.5, 2.0
+_BENT = 0.3  # of that: such an error of a bob of more than one shade returns with the place, and looks like the camera's view
 _SETTLED = 0.6  # another view is fitted only where the last made σ smaller than this share of what it was fitted with
 
 
@@ -87,6 +88,7 @@ def fit_jointly(
             None if camera.pivot_px is None else (*camera.pivot_px, 1.0),
             rows_along_x=camera.rows_along_x,
             off_px=camera.off_px,
+            bent_px=0.0 if camera.even else _BENT * camera.off_px,
         )
         if found is None:
             break

@@ -39,6 +39,10 @@ _BENDING = tuple(AT[name] for name in NAMES[10:])  # what bends the model: sampl
 _MOST = 160  # positions, and half as many lines, are enough to see what the camera did
 _CLEAR = 25.0  # by how much χ² must fall before a camera effect is believed
 _NEARNESSES = (-1.7, -1.2, -0.7, -0.2, 0.3)  # along which a valley is looked for: two standard deviations either way
+_BENT = (
+    0.5,
+    3.0,
+)  # times σ: a bent error is taken to be so large at least, and at most, for it leaves part of itself to be seen
 _LIKELY = 10.0  # so much higher in χ², a place still stands for some of what the clip allows
 _SAMPLES, _ROUNDS, _ENOUGH = 100, 10, 50  # draws a round; so many independent ones are wanted
 
@@ -83,10 +87,12 @@ def fit_view(
     pivot: tuple[float, float, float] | None = None,
     rows_along_x: bool = False,
     off_px: float = 0.02,
+    bent_px: float = 0.0,
 ) -> View | None:
     """Fit the joint model to positions (n,) with standard uncertainties at stamps t_s, from a swing's values (9,), whose
     state is that at t_s[0]. `pivot` is (x, y, σ) where it is known otherwise; `off_px` is how far the places may be off the
-    bob's centre, the same on all frames. None where no pendulum motion fits.
+    bob's centre, the same on all frames, and `bent_px` by how much that may change with the place. None where no pendulum
+    motion fits.
     """
     n = t_s.size
     some = np.unique(np.linspace(0, n - 1, min(n, _MOST)).astype(int))
@@ -98,7 +104,7 @@ def fit_view(
     )  # fmt: skip
     prior = {**_PRIOR, "off_x": (0.0, off_px), "off_y": (0.0, off_px)}
     places = t_s[some], x_px[some], y_px[some], sigma_x_px[some], sigma_y_px[some]
-    problem = _Problem(model, *places, lines, pivot, prior)
+    problem = _Problem(model, *places, lines, pivot, prior, bent_px)
     square = problem.solve(values, _SQUARE, 25)
     if square is None:
         return None
@@ -209,6 +215,7 @@ class _Problem:
         lines: Lines | None,
         pivot: tuple[float, float, float] | None,
         prior: dict[str, tuple[float, float]],
+        bent_px: float = 0.0,
     ) -> None:
         self.model = model
         if lines is not None and lines.x_px.size > _MOST // 2:
@@ -230,6 +237,7 @@ class _Problem:
         self.numbers = np.array([*model.middle_px, 1.0])
         self.steps = _STEPS.copy()
         self.steps[4] *= abs(model.values[4])
+        self.bent = float(np.clip(bent_px * np.median(np.minimum(self.wx, self.wy)), *_BENT))
 
     def rest(self, v: np.ndarray, motion: np.ndarray | None = None) -> np.ndarray:
         """Positions (x then y), lines, priors, over their standard uncertainties: (r,) for v (19,), (k, r) for (k, 19). Of each set
@@ -338,13 +346,14 @@ class _Problem:
     @property
     def least_inflation(self) -> float:
         """The inflation of residuals that are as large as their σ."""
-        return float(np.sqrt(1.0 + 0.25 * self.t.size / 5))
+        return float(np.sqrt(1.0 + self.bent**2 * self.t.size / 5))
 
     def inflation(self, values: np.ndarray) -> float:
         """How far the residuals exceed their σ, with their correlation from frame to frame.
 
-        At least as if half of σ were no scatter but a bent error that returns with the place (a shadow's, a shading's),
-        such as a handful of points along the arc would have.
+        At least as if half of σ, or what the bob's looks allow if that is more, were no scatter but a bent error that returns
+        with the place (a shadow's, a shading's, a pattern's that turns as often as the bob swings), such as a handful of
+        points along the arc would have.
         """
         n = self.t.size
         left = self.rest(values) * self.weaker
