@@ -73,7 +73,8 @@ def errors(view, truth, places):
 
 @pytest.mark.parametrize("off_px", [0.3, -0.3])
 def test_a_pattern_that_turns_as_often_as_the_bob_swings_is_no_view(off_px):
-    """Its error returns with the place, and hides in tilt and lens: only what is known of the bob's looks tells of it."""
+    """Its error returns with the place, and hides in tilt and lens: only what is known of the bob's looks tells of it. Stripes
+    look the same after half a turn."""
     _, truth, (t, x, y) = seen(0.75, string=False)
     turned = np.unwrap(np.arctan2(np.gradient(truth.theta_rad, t) / 4.0, truth.theta_rad))
     x, y = x + off_px * np.cos(2 * turned), y + off_px * np.sin(2 * turned)

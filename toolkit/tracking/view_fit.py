@@ -39,10 +39,7 @@ _BENDING = tuple(AT[name] for name in NAMES[10:])  # what bends the model: sampl
 _MOST = 160  # positions, and half as many lines, are enough to see what the camera did
 _CLEAR = 25.0  # by how much χ² must fall before a camera effect is believed
 _NEARNESSES = (-1.7, -1.2, -0.7, -0.2, 0.3)  # along which a valley is looked for: two standard deviations either way
-_BENT = (
-    0.5,
-    3.0,
-)  # times σ: a bent error is taken to be so large at least, and at most, for it leaves part of itself to be seen
+_BENT = 0.5, 3.0  # times σ: a bent error is at least and at most so large; part of a larger one would be seen
 _LIKELY = 10.0  # so much higher in χ², a place still stands for some of what the clip allows
 _SAMPLES, _ROUNDS, _ENOUGH = 100, 10, 50  # draws a round; so many independent ones are wanted
 
