@@ -28,6 +28,7 @@ _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
 _WAVERS = 0.02  # of the radius: what strays more from a swing may be a bold pattern's outline, taken for another
 _CALMER = 0.85  # times as far strays a bob that is looked at as it is
+_ROUND = 0.75  # of the outline: of a bold pattern's less is to be seen now and then
 _SHOWS, _HARDLY = (
     0.6,
     0.1,
@@ -322,7 +323,7 @@ class Known:
         calm_px: float,
     ) -> Trial | None:
         """Its outline as that of a bob with a bold pattern, which is then what is known of the bob: None, and all is as before, where
-        it strays more than so far from a swing."""
+        it strays more than so far from a swing, or its outline is to be seen all round."""
         t_s = np.array([batch[i].t_s for i in points])
         learned = learn_bold(self._sightings(batch, points), t_s, rough, self.swing, radius)
         if learned is None:
@@ -333,7 +334,7 @@ class Known:
             self.swing = learned.swing
             points = dict(zip(points, zip(*(c.tolist() for c in self.swing.position(t_s)))))
         trial = self._try(load_tracker("edge"), batch, points)
-        if trial is None or trial.swing.rms_px > calm_px:
+        if trial is None or trial.swing.rms_px > calm_px or min(trial.visible[1]) > _ROUND:
             self.look, self.exposure_s, self.growth, self.swing = before
             self.bold = False
             return None
