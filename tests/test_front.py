@@ -31,13 +31,14 @@ def visible(x, y):
     return 1 - disc[:, POST[0] : POST[1]].sum() / disc.sum()
 
 
-def patches(t, before=True):
-    """The post before or behind the bob."""
+def patches(t, before=True, grey=120.0):
+    """The post, so bright, before or behind the bob."""
     rng = np.random.default_rng(1)
     empty = np.full((H, W), 190.0, np.float32)
-    empty[:, POST[0] : POST[1]] = 120.0
+    empty[:, POST[0] : POST[1]] = grey
     for x, y in zip(*small_swing(t)):
         image = draw(x, y, rng, string=False, post=POST).astype(np.float32)
+        image[:, POST[0] : POST[1]] += grey - 120.0
         if not before:
             rows, columns = np.mgrid[0:H, 0:W]
             image[np.hypot(columns - x, rows - y) < RADIUS] = 60.0
@@ -56,16 +57,17 @@ def test_a_rhythm_holds_though_a_third_of_its_points_are_wrong():
     assert np.hypot(*(rhythm.position(t) - np.column_stack([x, y])).T).max() < 0.5
 
 
-def test_what_stands_before_the_way_is_found_and_nothing_else():
+@pytest.mark.parametrize("grey", [120.0, 85.0])
+def test_what_stands_before_the_way_is_found_and_nothing_else(grey):
     t = np.arange(90) / FPS
-    seen = list(patches(t))
+    seen = list(patches(t, grey=grey))
     back = Background((H, W))
     places = {i: (guess.x_px, guess.y_px) for i, (guess, _) in enumerate(seen)}
     front = find_front(lambda i, *_: seen[i], places, back, LOOK, 60.0)
     columns = np.flatnonzero(front.any(axis=0))
     assert abs(columns[0] - POST[0]) <= 3
     assert columns[-1] <= POST[1] + 3
-    behind = list(patches(t, before=False))
+    behind = list(patches(t, before=False, grey=grey))
     assert find_front(lambda i, *_: behind[i], places, back, LOOK, 60.0) is None
 
 

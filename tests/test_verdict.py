@@ -17,8 +17,9 @@ SIZE_PX = (640, 480)
 TIMES = np.arange(180) / 30.0
 
 
-def judge(omega2=20.0, length=400.0, theta0=0.3, rate0=0.0, gamma=0.01, seen=None, strays=0.0, misfit=0.0):
-    """Refused or not: a bob that strays so far (of its swing) from the fitted motion, seen on the frames `seen`."""
+def judge(omega2=20.0, length=400.0, theta0=0.3, rate0=0.0, gamma=0.01, seen=None, strays=0.0, misfit=0.0, repeated=0):
+    """Refused or not: a bob that strays so far (of its swing) from the fitted motion, seen on the frames `seen`, some of which
+    show the one two before once more."""
     values = np.array([320.0, 20.0, length, 0.0, omega2, gamma, 0.0, theta0, rate0])
     swing = Swing(values, np.zeros((9, 9)), 0.0, 0.02)
     x, y = swing.position(TIMES)
@@ -27,8 +28,19 @@ def judge(omega2=20.0, length=400.0, theta0=0.3, rate0=0.0, gamma=0.01, seen=Non
     places = Places(TIMES, x, y, sigma, sigma, good, ~good)
     off_px = strays * places.extent_px
     off = np.random.default_rng(1).normal(0, off_px, (2, TIMES.size))
-    swing, places = replace(swing, rms_px=0.02 + off_px), replace(places, x_px=x + off[0], y_px=y + off[1])
+    places = replace(places, x_px=x + off[0], y_px=y + off[1])
+    again = np.arange(repeated) * 20 + 21
+    places.x_px[again], places.y_px[again] = places.x_px[again - 2], places.y_px[again - 2]
+    apart = np.array([places.x_px - x, places.y_px - y])[:, good]
+    swing = replace(swing, rms_px=0.02 + float(np.sqrt(np.mean(apart**2))))
     require_pendulum(swing, places, SIZE_PX, Path("clip.mp4"), misfit)
+
+
+def test_a_bob_seen_on_half_of_the_frames_may_have_repeated_pictures_but_no_other_strays():
+    half = np.arange(TIMES.size) % 20 < 10
+    judge(seen=half, repeated=8)
+    with pytest.raises(JobError, match="seen on 50%"):
+        judge(seen=half, strays=0.03)
 
 
 def test_what_does_not_look_like_a_bob_has_to_swing_the_better():

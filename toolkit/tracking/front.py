@@ -17,7 +17,7 @@ from toolkit.tracking.looks import light_on
 EVEN = 0.08  # of the bob's contrast: less misfit is an even disc's
 _HARMONICS = 2
 _TURNS = 12
-_UNLIKE = 0.3  # of the bob's contrast: what differs less from it than that tells nothing
+_UNLIKE, _CLEARLY = 0.3, 6.0  # of the bob's contrast; of the noise: what differs less from it than both tells nothing
 _WELL_WITHIN = 0.85  # of the radius
 _OFTEN = 3  # frames
 _LARGE = 0.1  # of the bob's disc
@@ -150,6 +150,7 @@ def find_front(
     import cv2
 
     bare, covered = np.zeros(back.mean.shape, np.int16), np.zeros(back.mean.shape, np.int16)
+    least = min(_UNLIKE * abs(look.contrast), _CLEARLY * look.noise)
     for i, place in places.items():
         guess, patch = show(i, *place)
         if patch is None:
@@ -160,11 +161,7 @@ def find_front(
             continue  # shaken out of the first frame
         across, down = np.arange(columns) + (x0 - guess.x_px), np.arange(rows)[:, None] + (y0 - guess.y_px)
         away = np.abs(patch.back - shade)
-        tells = (
-            (np.hypot(across, down) < _WELL_WITHIN * look.radius_px)
-            & (patch.seen > 0)
-            & (away > _UNLIKE * abs(look.contrast))
-        )
+        tells = (np.hypot(across, down) < _WELL_WITHIN * look.radius_px) & (patch.seen > 0) & (away > least)
         alike = np.abs(patch.image / light_on(patch) - patch.back) < 0.4 * away
         window = (slice(y0, y0 + rows), slice(x0, x0 + columns))
         bare[window] += tells & alike

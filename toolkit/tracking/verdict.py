@@ -42,7 +42,9 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
     clear = good.mean() > 0.95 and misfit < _UNLIKE
     shaky = 0.06 if clear else 0.04  # a hand-held camera before a plain wall: told as a warning
     strays = swing.rms_px > max(shaky * extent, 0.3)
-    seldom = good.mean() < 0.6 and swing.rms_px > 0.015 * extent
+    off = np.hypot(*(p[good] - m for p, m in zip((places.x_px, places.y_px), swing.position(t[good]))))
+    mostly_px = float(np.median(off)) / 1.18  # a standard deviation per axis, whatever a repeated picture adds
+    seldom = good.mean() < 0.6 and mostly_px > 0.015 * extent
     if (straight or strays or seldom) and swing.values[4] > 0 and _is_ellipse(swing, places):
         straight = strays = seldom = False
     if straight:
@@ -50,7 +52,7 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
     if strays:
         reasons.append(f"it strays {swing.rms_px:.1f} px from a swing of {extent:.0f} px")
     if seldom:
-        reasons.append(f"it was seen on {good.mean():.0%} of the frames, straying {swing.rms_px:.1f} px")
+        reasons.append(f"it was seen on {good.mean():.0%} of the frames, straying {mostly_px:.1f} px")
     growth, growth_sigma = _growth(swing, t[good])
     if growth - 3 * growth_sigma > 0.5:
         reasons.append(f"its swing grows by {np.expm1(growth):.0%}")
