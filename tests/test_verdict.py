@@ -25,14 +25,14 @@ def judge(omega2=20.0, length=400.0, theta0=0.3, rate0=0.0, gamma=0.01, seen=Non
     x, y = swing.position(TIMES)
     good = np.ones(TIMES.size, bool) if seen is None else seen
     sigma = np.full(TIMES.size, 0.02)
-    places = Places(TIMES, x, y, sigma, sigma, good, ~good)
-    off_px = strays * places.extent_px
-    off = np.random.default_rng(1).normal(0, off_px, (2, TIMES.size))
-    places = replace(places, x_px=x + off[0], y_px=y + off[1])
+    shown = np.array([x, y])
     again = np.arange(repeated) * 20 + 21
-    places.x_px[again], places.y_px[again] = places.x_px[again - 2], places.y_px[again - 2]
-    apart = np.array([places.x_px - x, places.y_px - y])[:, good]
-    swing = replace(swing, rms_px=0.02 + float(np.sqrt(np.mean(apart**2))))
+    shown[:, again] = shown[:, again - 2]
+    places = Places(TIMES, *shown, sigma, sigma, good, ~good)
+    off_px = strays * places.extent_px
+    late_px = float(np.sqrt(np.mean((shown - [x, y])[:, good] ** 2)))
+    shown += np.random.default_rng(1).normal(0, off_px, shown.shape)
+    swing, places = replace(swing, rms_px=0.02 + off_px + late_px), replace(places, x_px=shown[0], y_px=shown[1])
     require_pendulum(swing, places, SIZE_PX, Path("clip.mp4"), misfit)
 
 
