@@ -253,6 +253,24 @@ def test_frames_lost_again_and_again_are_all_counted(fraction, theta0):
     assert 2 * np.pi / swing.period_s == pytest.approx(np.sqrt(9.81 / 0.6), rel=2e-3)
 
 
+def test_lost_frames_are_counted_about_what_the_camera_saw():
+    """Out of its plane the bob turns px beside the arc, where it moves that far in several frames."""
+    depth = {"amplitude_rad": 0.09, "phase_rad": 3.1, "distance_m": 2.0}
+    lossy = {"fraction": 0.16, "stamps": "counted"}
+    _, truth, (stamps, x, y) = seen(
+        0.8, False, out_of_plane=depth, dropped_frames=lossy, rolling_shutter={"readout_s": 0.006}
+    )
+    true = truth.t_s - truth.t_s[0]
+    start = start_swing(stamps[:60], x[:60], y[:60])
+    followed = fit_swing(stamps[:60], x[:60], y[:60], np.full(60, 0.1), start)
+    warned: list[str] = []
+    found, _ = timed_swing(followed, placed(stamps, x, y), Path("clip"), warned, (640, 480))
+    assert [w.key for w in warned] == ["track.lost_frames"]
+    speed = np.abs(np.gradient(truth.theta_rad, true))
+    late = (found.t_s - true)[speed > 0.1 * speed.max()]
+    np.testing.assert_allclose(late, late[0], atol=4e-3)  # a frame lasts 17 ms, the shutter rolls 3
+
+
 def test_frames_are_not_placed_where_more_is_amiss():
     motion = Swing(np.array([320, -60, 400, 0.0, 12.0, 0.02, 0.0, 0.4, 0.0]), np.zeros((9, 9)), 0.0, 0.0)
     true = np.delete(np.arange(301) / 60, 130)

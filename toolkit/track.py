@@ -240,7 +240,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     places, stamps = held_still(places, log), places.t_s
 
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
-    places, swing = timed_swing(followed, places, video.path, warnings)
+    turned = video.rotation_deg % 180 != 0
+    places, swing = timed_swing(followed, places, video.path, warnings, size_px, turned)
     if shake.taken:
         places, swing = shake.checked(places, swing)
     swing = held_swing(swing, places, _strings(record, places, shake, look.radius_px, fps_factor).seen(), size_px)
@@ -255,7 +256,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     good = places.good
     off_px = misfit * look.radius_px / 3
     strings = _strings(record, places, shake, look.radius_px, fps_factor)
-    camera = Camera(size_px, pivot, video.rotation_deg % 180 != 0, max(0.02, off_px), fps_factor, look.even)
+    camera = Camera(size_px, pivot, turned, max(0.02, off_px), fps_factor, look.even)
     lines = strings.seen()
     joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
     # with tilt, lens and shutter taken out some are no strays, and others hid in these

@@ -102,10 +102,17 @@ def late_told(places: Places, late: np.ndarray, log: list[str], warnings: list[s
         )
 
 
-def timed_swing(followed: Swing, places: Places, path: Path, warnings: list[str]) -> tuple[Places, Swing]:
+def timed_swing(
+    followed: Swing,
+    places: Places,
+    path: Path,
+    warnings: list[str],
+    size_px: tuple[int, int] | None = None,
+    rows_along_x: bool = False,
+) -> tuple[Places, Swing]:
     """The motion over the whole clip from the one followed, and the places at times with the frames put back that a camera
     lost without a gap in its stamps. Raises JobError where no pendulum's motion goes through the places."""
-    counted = count_lost(places, followed.values_at(places.t_s[places.good][0]))
+    counted = count_lost(places, followed.values_at(places.t_s[places.good][0]), size_px, rows_along_x)
     if counted is not None and counted[1].rms_px <= _PLACED * places.extent_px:
         warnings.append(_lost_told(places.t_s, counted[0].t_s))
         return counted

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.tracking.least_squares import least_squares
 from toolkit.tracking.places import Places
+from toolkit.tracking.recount_seen import count_as_seen
 from toolkit.tracking.swing import CALM, NAMES, Swing, fit_swing, small_steps
 
 _ABOUT = 4  # steps on either side that tell how far the bob moves in one frame there
@@ -97,11 +98,14 @@ def swing_of_sweeps(start: np.ndarray, places: Places, sweep: np.ndarray) -> tup
     return Swing(least.values[:9], np.zeros((9, 9)), t0, rms), np.concatenate([[0.0], np.cumsum(least.values[9:])])
 
 
-def count_lost(places: Places, start: np.ndarray) -> tuple[Places, Swing] | None:
+def count_lost(
+    places: Places, start: np.ndarray, size_px: tuple[int, int] | None = None, rows_along_x: bool = False
+) -> tuple[Places, Swing] | None:
     """The places at times with all frames put back that were lost, and the motion at these times, from a start (9,) at the
     first place. None where the steps of the bob do not tell of lost frames, or not well enough to count them all.
 
-    In turns: the motion of the sweeps, and of all ways in which frames can be lost the one that agrees with it best.
+    In turns: the motion of the sweeps, and of all ways in which frames can be lost the one that agrees with it best. Where
+    that comes to no end, and the picture's size is given, about the motion as the camera saw it.
     """
     told = recounted(places)
     if told is None or told[1].max() > _SWEEPS:
@@ -109,6 +113,7 @@ def count_lost(places: Places, start: np.ndarray) -> tuple[Places, Swing] | None
     now, sweep = told
     start = np.where([name in CALM for name in NAMES], 0.0, start)  # damping seen over a second or so is none
     stamps, usual = places.t_s, float(np.median(np.diff(places.t_s)))
+    tried: list[tuple[np.ndarray, np.ndarray]] = []
     for _ in range(_ROUNDS):
         fitted = swing_of_sweeps(start, now, sweep)
         if fitted is None:
@@ -118,6 +123,7 @@ def count_lost(places: Places, start: np.ndarray) -> tuple[Places, Swing] | None
         lost = np.round((now.t_s - stamps + delays[np.maximum(sweep[last], 0)]) / usual).astype(int)
         lost = _lost_before(motion, stamps, places, np.maximum.accumulate(np.maximum(lost, 0)))
         before, now, start = now, replace(places, t_s=stamps + lost * usual), motion.values
+        tried.append((lost, start))
         if np.array_equal(before.t_s, now.t_s):
             break
     some = places.some()
@@ -130,7 +136,17 @@ def count_lost(places: Places, start: np.ndarray) -> tuple[Places, Swing] | None
         best = now, swing
         lost = _lost_before(swing, stamps, places, np.round((now.t_s - stamps) / usual).astype(int))
         now, start = replace(places, t_s=stamps + lost * usual), swing.values
-    return best if best is not None and _counted_right(*best, sweep >= 0) else None
+    if best is None or _counted_right(*best, sweep >= 0):
+        return best
+    if size_px is None:
+        return None
+    for lost, values in tried[:1] + tried[-1:]:  # turns that went astray began well, or ended well
+        counted = count_as_seen(places, lost, values, size_px, rows_along_x)
+        if counted is not None:
+            now = replace(places, t_s=stamps + counted * usual)
+            swing = fit_swing(now.t_s[some], x, y, sigma, best[1].values)
+            return None if swing is None else (now, swing)
+    return None
 
 
 def _counted_right(places: Places, swing: Swing, fast: np.ndarray) -> bool:

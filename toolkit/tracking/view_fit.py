@@ -27,7 +27,7 @@ _STEPS = np.array(
 )
 # Standard deviations of what cameras do, by judgement: some 10 degrees off square, lenses that bend 5 % at the corner,
 # swings 3 degrees out of the plane, readouts of 15 ms; focal lengths of 1.2 to 3.3 picture widths (nearness = width / focal length).
-_PRIOR = {
+PRIOR = {
     "factor": (1.0, 0.3), "yaw": (0.0, 0.2), "pitch": (0.0, 0.12), "log_nearness": (-0.7, 0.5), "k1": (0.0, 0.05),
     "sway_sin": (0.0, 0.05), "sway_cos": (0.0, 0.05), "readout": (0.0, 0.015),
 }  # fmt: skip
@@ -94,12 +94,12 @@ def fit_view(
     n = t_s.size
     some = np.unique(np.linspace(0, n - 1, min(n, _MOST)).astype(int))
     values = np.concatenate([start, [1.0], np.zeros(len(NAMES) - 10)])
-    values[AT["log_nearness"]] = _PRIOR["log_nearness"][0]
+    values[AT["log_nearness"]] = PRIOR["log_nearness"][0]
     model = View(
         values, np.zeros(0), np.zeros(0), np.zeros(0), (), ((size_px[0] - 1) / 2, (size_px[1] - 1) / 2),
         float(t_s[0]), 1.0, rows_along_x,
     )  # fmt: skip
-    prior = {**_PRIOR, "off_x": (0.0, off_px), "off_y": (0.0, off_px)}
+    prior = {**PRIOR, "off_x": (0.0, off_px), "off_y": (0.0, off_px)}
     places = t_s[some], x_px[some], y_px[some], sigma_x_px[some], sigma_y_px[some]
     problem = _Problem(model, *places, lines, pivot, prior, bent_px)
     square = problem.solve(values, _SQUARE, 25)
