@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.tracking.least_squares import least_squares
 from toolkit.tracking.places import Places
 from toolkit.tracking.recount_seen import count_as_seen
-from toolkit.tracking.swing import CALM, NAMES, Swing, fit_swing, small_steps
+from toolkit.tracking.swing import CALM, NAMES, Swing, fit_swing, small_steps, start_swing
 
 _ABOUT = 4  # steps on either side that tell how far the bob moves in one frame there
 _FAST = 0.4  # of the greatest speed: slower, a step two frames long may be one of a bob that gathers speed
@@ -102,7 +102,8 @@ def count_lost(
     places: Places, start: np.ndarray, size_px: tuple[int, int] | None = None, rows_along_x: bool = False
 ) -> tuple[Places, Swing] | None:
     """The places at times with all frames put back that were lost, and the motion at these times, from a start (9,) at the
-    first place. None where the steps of the bob do not tell of lost frames, or not well enough to count them all.
+    first place (from the places alone where it is not finite). None where the steps of the bob do not tell of lost frames, or
+    not well enough to count them all.
 
     In turns: the motion of the sweeps, and of all ways in which frames can be lost the one that agrees with it best. Where
     that comes to no end, and the picture's size is given, about the motion as the camera saw it.
@@ -111,7 +112,10 @@ def count_lost(
     if told is None or told[1].max() > _SWEEPS:
         return None
     now, sweep = told
-    start = np.where([name in CALM for name in NAMES], 0.0, start)  # damping seen over a second or so is none
+    begun = start if np.isfinite(start).all() else start_swing(*(c[now.good] for c in (now.t_s, now.x_px, now.y_px)))
+    if begun is None:
+        return None
+    start = np.where([name in CALM for name in NAMES], 0.0, begun)  # damping seen over a second or so is none
     stamps, usual = places.t_s, float(np.median(np.diff(places.t_s)))
     tried: list[tuple[np.ndarray, np.ndarray]] = []
     for _ in range(_ROUNDS):
