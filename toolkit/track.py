@@ -237,7 +237,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     if follower.unsteady:
         shake.look_at_string(places, _strings(record, places, shake, look.radius_px, fps_factor))
     places = replace(places, x_px=places.x_px + shake.raw_x - shake.x, y_px=places.y_px + shake.raw_y - shake.y)
-    places, stamps = held_still(places, log), places.t_s
+    stamps = places.t_s
+    places = held_still(places, log)
 
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
     turned = video.rotation_deg % 180 != 0

@@ -29,10 +29,8 @@ _ENOUGH = 12  # frames
 _WAVERS = 0.02  # of the radius: what strays more from a swing may be a bold pattern's outline, taken for another
 _CALMER = 0.85  # times as far strays a bob that is looked at as it is
 _ROUND = 0.75  # of the outline: of a bold pattern's less is to be seen now and then
-_SHOWS, _HARDLY = (
-    0.6,
-    0.1,
-)  # of the outline, at least, where the bob is said to be found: and of one with a bold pattern
+# of the outline, at least, where the bob is said to be found; and of one with a bold pattern
+_SHOWS, _HARDLY = 0.6, 0.1
 _LESS = 0.8  # of the misfit: by so much a bob with a pattern is explained better with a shadow
 
 
