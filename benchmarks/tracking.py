@@ -417,7 +417,7 @@ def run_speed(video: Path, repeats: int = 3) -> None:
     """
     from toolkit.track import _begin, _read_ahead
     from toolkit.trackers import load_tracker
-    from toolkit.tracking.acquire import find_bob
+    from toolkit.tracking.begin.acquire import find_bob
     from toolkit.video import open_video
 
     def timed(job: Callable[[], Any]) -> np.ndarray:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.bold import learn_bold
-from toolkit.tracking.looks import Sightings
-from toolkit.tracking.swing import fit_swing, start_swing
+from toolkit.tracking.begin.bold import learn_bold
+from toolkit.tracking.geometry.swing import fit_swing, start_swing
+from toolkit.tracking.picture.looks import Sightings
 
 WALL, DARK, RADIUS = 180.0, 70.0, 16.0
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolkit.tracking.scatter import quick_scatter, true_sigma
-from toolkit.tracking.string_line import measure_string, seen_half
-from toolkit.tracking.verdict import poor_picture
+from toolkit.tracking.clip.scatter import quick_scatter, true_sigma
+from toolkit.tracking.clip.verdict import poor_picture
+from toolkit.tracking.picture.string_line import measure_string, seen_half
 
 N = 400
 T = np.arange(N) / 60

@@ -9,8 +9,8 @@ from test_track import FPS, LENGTH, OMEGA, PIVOT, RADIUS, H, W, draw, film
 from toolkit.track import OK, track
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.background import Background
-from toolkit.tracking.front import Rhythm, enough_shows, find_front
+from toolkit.tracking.picture.background import Background
+from toolkit.tracking.picture.front import Rhythm, enough_shows, find_front
 
 pytest.importorskip("av")
 

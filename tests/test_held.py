@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolkit.tracking.held import held_swing
-from toolkit.tracking.places import Places
-from toolkit.tracking.swing import fit_swing
-from toolkit.tracking.view_fit import Lines
+from toolkit.tracking.clip.held import held_swing
+from toolkit.tracking.clip.places import Places
+from toolkit.tracking.geometry.swing import fit_swing
+from toolkit.tracking.geometry.view_fit import Lines
 
 PIVOT, LENGTH, SIZE = (240.0, 40.0), 500.0, (480, 640)
 

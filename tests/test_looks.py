@@ -10,9 +10,9 @@ from test_track import H, W, film
 
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.learn import _by_speed
-from toolkit.tracking.looks import Sightings, _nears, learn_looks
-from toolkit.tracking.stillness import Anchors
+from toolkit.tracking.begin.learn import _by_speed
+from toolkit.tracking.picture.looks import Sightings, _nears, learn_looks
+from toolkit.tracking.picture.stillness import Anchors
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")

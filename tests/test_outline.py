@@ -7,9 +7,9 @@ from scipy.ndimage import gaussian_filter
 from toolkit.trackers import disc, edge
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.outline import pulled_by_string
-from toolkit.tracking.places import Places
-from toolkit.tracking.swing import Swing
+from toolkit.tracking.clip.outline import pulled_by_string
+from toolkit.tracking.clip.places import Places
+from toolkit.tracking.geometry.swing import Swing
 
 K1, RADIUS, FINE = -0.1, 14.0, 8
 MIDDLE = np.array([319.5, 239.5])

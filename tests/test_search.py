@@ -8,11 +8,12 @@ from test_track import LENGTH, PIVOT, RADIUS, H, W, angles, film
 
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Look
-from toolkit.tracking.acquire import _is_shadow_of
-from toolkit.tracking.search import find_round_movers, find_round_near, silhouette, still_picture
-from toolkit.tracking.sight import Sight, best_sight
-from toolkit.tracking.swing import fit_swing, start_swing
-from toolkit.tracking.trail import Rough
+from toolkit.tracking.begin.acquire import _is_shadow_of
+from toolkit.tracking.begin.search import find_round_movers, find_round_near
+from toolkit.tracking.begin.trail import Rough
+from toolkit.tracking.geometry.swing import fit_swing, start_swing
+from toolkit.tracking.picture.plane import silhouette, still_picture
+from toolkit.tracking.picture.sight import Sight, best_sight
 from toolkit.video import Frame
 
 pytest.importorskip("av")

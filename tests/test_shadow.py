@@ -9,7 +9,7 @@ from test_track import LENGTH, PIVOT, H, W, angles, film
 
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.shadow import Shadow, find_shadow
+from toolkit.tracking.picture.shadow import Shadow, find_shadow
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")

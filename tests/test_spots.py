@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from toolkit.trackers.localiser import Patch
-from toolkit.tracking.front import WITHIN
-from toolkit.tracking.spots import tell_bob
+from toolkit.tracking.picture.front import WITHIN
+from toolkit.tracking.picture.spots import tell_bob
 
 
 @pytest.mark.parametrize(("x", "y"), [(70.3, 55.8), (41.0, 55.8), (42.2, 30.4)])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from toolkit.tracking.places import Places
-from toolkit.tracking.string_shake import shake_on_string
-from toolkit.tracking.view_fit import Lines
+from toolkit.tracking.clip.places import Places
+from toolkit.tracking.clip.string_shake import shake_on_string
+from toolkit.tracking.geometry.view_fit import Lines
 
 T = np.arange(240) / 60
 PIVOT, LENGTH, REACH = np.array([320.0, -60.0]), 430.0, 0.06

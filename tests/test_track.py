@@ -10,9 +10,9 @@ import pytest
 from toolkit.calibrate import arc_pivot, calibrate, line_pivot, write_calibration_json
 from toolkit.errors import JobError, UsageError
 from toolkit.track import OK, PREDICTED, _begin, track, write_track_csv
-from toolkit.tracking.hands import held_still
-from toolkit.tracking.places import Places
-from toolkit.tracking.swing import NAMES, fit_circle, fit_swing
+from toolkit.tracking.clip.hands import held_still
+from toolkit.tracking.clip.places import Places
+from toolkit.tracking.geometry.swing import NAMES, fit_circle, fit_swing
 from toolkit.video import open_video
 
 av = pytest.importorskip("av")
@@ -225,7 +225,7 @@ def test_swing_fit_recovers_its_own_motion():
     t = np.arange(0, 6, 1 / 60)
     truth = np.array([320, -100, 400, 0.01, 9.0, 0.01, 0.02, 0.35, 0.1])
     start = truth * 1.02
-    from toolkit.tracking.swing import Swing
+    from toolkit.tracking.geometry.swing import Swing
 
     x, y = Swing(truth, np.zeros((9, 9)), 0.0, 0.0).position(t)
     rng = np.random.default_rng(1)
@@ -289,7 +289,7 @@ def test_what_passes_by_is_no_slow_swing_and_a_swing_is_one():
     from types import SimpleNamespace
 
     from toolkit.trackers.localiser import Look
-    from toolkit.tracking.trail import swing_through
+    from toolkit.tracking.begin.trail import swing_through
 
     t, noise = np.arange(96) / FPS, np.random.default_rng(3).normal(0, 0.1, (2, 96))
     batch = [SimpleNamespace(t_s=float(s)) for s in t]

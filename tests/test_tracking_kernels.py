@@ -10,14 +10,15 @@ from scipy.integrate import solve_ivp
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from toolkit.motion.compiled import keeps_objects
-from toolkit.tracking.background import Background
-from toolkit.tracking.repeat import alike
-from toolkit.tracking.search import _edges, shrink
-from toolkit.tracking.stillness import Anchors
-from toolkit.tracking.string_line import measure_string
-from toolkit.tracking.swing import Swing, solve_swing
-from toolkit.tracking.view import NAMES, View
-from toolkit.tracking.view_fit import Lines, _Problem
+from toolkit.tracking.begin.search import _edges
+from toolkit.tracking.geometry.swing import Swing, solve_swing
+from toolkit.tracking.geometry.view import NAMES, View
+from toolkit.tracking.geometry.view_fit import Lines, _Problem
+from toolkit.tracking.picture.background import Background
+from toolkit.tracking.picture.plane import shrink
+from toolkit.tracking.picture.repeat import alike
+from toolkit.tracking.picture.stillness import Anchors
+from toolkit.tracking.picture.string_line import measure_string
 from toolkit.video import Frame
 
 ROOT = Path(__file__).parents[1]

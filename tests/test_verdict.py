@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from toolkit.errors import JobError
-from toolkit.tracking.places import Places
-from toolkit.tracking.swing import Swing
-from toolkit.tracking.verdict import require_pendulum
+from toolkit.tracking.clip.places import Places
+from toolkit.tracking.clip.verdict import require_pendulum
+from toolkit.tracking.geometry.swing import Swing
 
 SIZE_PX = (640, 480)
 TIMES = np.arange(180) / 30.0

@@ -12,13 +12,13 @@ from toolkit.calibrate import calibrate
 from toolkit.render import stage
 from toolkit.scene import Scene
 from toolkit.track import Track
-from toolkit.tracking.clock import lone_strays, out_of_time, place_lost_frames, strays_told, timed_swing
-from toolkit.tracking.places import Places
-from toolkit.tracking.shake import Shake
-from toolkit.tracking.stillness import CameraShift
-from toolkit.tracking.swing import Swing, fit_swing, start_swing
-from toolkit.tracking.view import AT
-from toolkit.tracking.view_fit import Lines, fit_view
+from toolkit.tracking.clip.clock import lone_strays, out_of_time, place_lost_frames, strays_told, timed_swing
+from toolkit.tracking.clip.places import Places
+from toolkit.tracking.clip.shake import Shake
+from toolkit.tracking.geometry.swing import Swing, fit_swing, start_swing
+from toolkit.tracking.geometry.view import AT
+from toolkit.tracking.geometry.view_fit import Lines, fit_view
+from toolkit.tracking.picture.stillness import CameraShift
 
 SIGMA = 0.03
 
@@ -286,7 +286,7 @@ def test_frames_are_not_placed_where_more_is_amiss():
 
 def test_draws_of_which_hardly_one_counts_come_to_an_end(monkeypatch):
     """First draws a thousand times too wide: nearly all weights are zero to the last digit."""
-    from toolkit.tracking import view_fit
+    from toolkit.tracking.geometry import view_fit
 
     narrow = view_fit._Problem.sample
 

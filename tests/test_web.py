@@ -71,7 +71,7 @@ def test_the_first_frame_is_shown_in_its_own_pixels():
 def test_where_the_tracker_asks_for_a_click_the_page_says_how(lang, tmp_path):
     from toolkit import JobError
     from toolkit.report.words import load_words
-    from toolkit.tracking.acquire import REMEDY
+    from toolkit.tracking.begin.acquire import REMEDY
     from toolkit.web.page import _told, _Visit
 
     words, visit = load_words(lang), _Visit(tmp_path)

@@ -1,6 +1,6 @@
 """From where the bob was in the picture to θ(t): the pivot, the vertical, the camera's view and the error bars.
 
-The view (`toolkit.tracking.view`) is one fit of motion, pivot and camera to all positions and string lines. Each place is
+The view (`toolkit.tracking.geometry.view`) is one fit of motion, pivot and camera to all positions and string lines. Each place is
 turned into an angle by it. What is common to all frames (the zero and the scale of all angles) is kept apart from the
 random σ of each frame; what the camera may have done beyond these two is in σ.
 """
@@ -21,10 +21,10 @@ from toolkit.scene import Scene
 from toolkit.sentence import said
 from toolkit.series import ThetaSeries
 from toolkit.track import LOST, PREDICTED, Track
-from toolkit.tracking.pivot import PivotEstimate, arc_pivot, line_pivot
-from toolkit.tracking.swing import start_swing
-from toolkit.tracking.view import View
-from toolkit.tracking.view_fit import Lines, fit_view
+from toolkit.tracking.geometry.pivot import PivotEstimate, arc_pivot, line_pivot
+from toolkit.tracking.geometry.swing import start_swing
+from toolkit.tracking.geometry.view import View
+from toolkit.tracking.geometry.view_fit import Lines, fit_view
 
 __all__ = ["arc_pivot", "calibrate", "line_pivot", "write_calibration_json"]
 

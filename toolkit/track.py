@@ -17,20 +17,28 @@ from toolkit.output import whole_file
 from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
-from toolkit.tracking.acquire import REMEDY, find_bob
-from toolkit.tracking.clock import even_times, late_told, lone_strays, out_of_time, slips_told, strays_told, timed_swing
+from toolkit.tracking.begin.acquire import REMEDY, find_bob
+from toolkit.tracking.clip.clock import (
+    even_times,
+    late_told,
+    lone_strays,
+    out_of_time,
+    slips_told,
+    strays_told,
+    timed_swing,
+)
+from toolkit.tracking.clip.hands import held_still
+from toolkit.tracking.clip.held import held_swing
+from toolkit.tracking.clip.joint import Camera, fit_jointly
+from toolkit.tracking.clip.outline import pulled_by_string
+from toolkit.tracking.clip.places import Places
+from toolkit.tracking.clip.scatter import Factors
+from toolkit.tracking.clip.shake import Shake
+from toolkit.tracking.clip.verdict import poor_motion, poor_picture, require_pendulum
 from toolkit.tracking.follow import Follower, Record
-from toolkit.tracking.hands import held_still
-from toolkit.tracking.held import held_swing
-from toolkit.tracking.joint import Camera, fit_jointly
-from toolkit.tracking.outline import pulled_by_string
-from toolkit.tracking.places import Places
-from toolkit.tracking.scatter import Factors
-from toolkit.tracking.shake import Shake
-from toolkit.tracking.string_line import seen_half
-from toolkit.tracking.swing import Swing
-from toolkit.tracking.verdict import poor_motion, poor_picture, require_pendulum
-from toolkit.tracking.view_fit import Lines
+from toolkit.tracking.geometry.swing import Swing
+from toolkit.tracking.geometry.view_fit import Lines
+from toolkit.tracking.picture.string_line import seen_half
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"

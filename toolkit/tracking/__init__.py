@@ -1,1 +1,1 @@
-"""What tracking a bob is made of: the search, following it, the string, the still background, the shake, the swing."""
+"""What tracking a bob is made of: `begin`, then `follow` frame by frame, then the whole `clip`; on what a `picture` shows and `geometry`."""

@@ -10,17 +10,18 @@ import numpy as np
 
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
-from toolkit.tracking.front import WITHIN, enough_shows, hidden_share
-from toolkit.tracking.learn import Known
-from toolkit.tracking.looks import light_on
-from toolkit.tracking.passer import surroundings
-from toolkit.tracking.repeat import alike, thinned
-from toolkit.tracking.search import find_round_near, silhouette
-from toolkit.tracking.spots import tell_bob
-from toolkit.tracking.stillness import CameraShift
-from toolkit.tracking.string_line import measure_string
-from toolkit.tracking.swing import CALM, fit_swing, start_swing
-from toolkit.tracking.trail import Rough
+from toolkit.tracking.begin.learn import Known
+from toolkit.tracking.begin.search import find_round_near
+from toolkit.tracking.begin.trail import Rough
+from toolkit.tracking.geometry.swing import CALM, fit_swing, start_swing
+from toolkit.tracking.picture.front import WITHIN, enough_shows, hidden_share
+from toolkit.tracking.picture.looks import light_on
+from toolkit.tracking.picture.passer import surroundings
+from toolkit.tracking.picture.plane import silhouette
+from toolkit.tracking.picture.repeat import alike, thinned
+from toolkit.tracking.picture.spots import tell_bob
+from toolkit.tracking.picture.stillness import CameraShift
+from toolkit.tracking.picture.string_line import measure_string
 from toolkit.video import Frame
 
 # frames: so often the string, and its pull on the bob's place, are measured, and for so long; then ever less often

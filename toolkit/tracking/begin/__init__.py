@@ -1,0 +1,1 @@
+"""From the frames read ahead: where the bob is, how it looks, how it is best measured."""

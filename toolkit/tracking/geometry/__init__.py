@@ -1,0 +1,1 @@
+"""The motion of a pendulum, how a camera sees it, and their fits."""

@@ -1,0 +1,253 @@
+"""The bob's shadow on the wall behind it: a soft disc that swings along at a fixed offset and takes the same share of light
+from whatever is there. Taken for a part of the bob it would draw its centre by pixels.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from toolkit.trackers.localiser import Guess, Look, Patch
+from toolkit.tracking.geometry.least_squares import least_squares
+from toolkit.tracking.picture.plane import rim_level
+
+_PIXELS = 3000  # so many are compared with the model
+_CLEAR = 8.0  # grey levels: what the model leaves counts less where it is more
+_ALIKE = 1.1  # so much worse a model may be, and as likely
+_OWN = 6.0  # grey levels: what is explained less well may be the bob
+_SHADOWY_PX = 1.2  # a sharper edge is no shadow's
+_DARK = 0.04  # share of light that is missed beside the bob wherever a shadow is looked for
+
+
+class Shadow(NamedTuple):
+    """Its centre less the bob's, its radius, the standard deviation of its edge (px), and the share of light it takes."""
+
+    right_px: float
+    down_px: float
+    radius_px: float
+    soft_px: float
+    strength: float
+
+    def light(self, right: np.ndarray, down: np.ndarray) -> np.ndarray:
+        """How much of the light is left at places relative to the bob's centre, px."""
+        d = np.hypot(right - self.right_px, down - self.down_px)
+        return 1 - self.strength * _covered(d, self.radius_px, self.soft_px)
+
+    def cast(self, patch: Patch, guess: Guess) -> Patch:
+        """The patch with a background on which the shadow of a bob at the guess lies, smeared along its streak."""
+        rows, columns = patch.back.shape
+        down = np.arange(rows)[:, None] + (patch.y_px - guess.y_px)
+        right = np.arange(columns)[None, :] + (patch.x_px - guess.x_px)
+        streak = float(np.hypot(guess.streak_x_px, guess.streak_y_px))
+        parts = np.arange(0.5, int(streak / self.soft_px) + 1) / (int(streak / self.soft_px) + 1) - 0.5
+        left = sum(self.light(right - p * guess.streak_x_px, down - p * guess.streak_y_px) for p in parts)
+        return patch._replace(back=(patch.back * (left / parts.size)).astype(np.float32))
+
+    def circle(self, x_px: float, y_px: float, radius_px: float) -> tuple[float, float, float]:
+        """The circle that holds one of this radius about the bob, and the shadow."""
+        far = float(np.hypot(self.right_px, self.down_px))
+        beyond = self.radius_px + 2 * self.soft_px
+        if far + beyond <= radius_px:
+            return x_px, y_px, radius_px
+        whole = 0.5 * (far + beyond + radius_px)
+        part = (whole - radius_px) / max(far, 1e-9)
+        return x_px + part * self.right_px, y_px + part * self.down_px, whole
+
+
+class Shaded(NamedTuple):
+    """A shadow, and what the bob is without it: its centre less where it was taken to be, its radius and edge, px, and its
+    contrast, grey levels."""
+
+    shadow: Shadow
+    x_px: float
+    y_px: float
+    radius_px: float
+    edge_px: float
+    contrast: float
+
+    @property
+    def taken_for_bob(self) -> bool:
+        """Was the bob, which is clear of it, taken to be where its shadow is?"""
+        to_bob = np.hypot(self.x_px, self.y_px)
+        to_shadow = np.hypot(self.x_px + self.shadow.right_px, self.y_px + self.shadow.down_px)
+        return bool(to_shadow < 0.3 * self.radius_px and to_bob > self.radius_px)
+
+
+def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
+    """The shadow beside the bob, by what is fitted to patches on which the bob is slow (each with the guess at its centre).
+    None where the bob alone explains them nearly as well."""
+    u, v, image, back, beside = _pixels(seen, look)
+    unlike = look.noise > 0.02 * abs(look.contrast) + 2.5  # a shadow that overlaps the bob is fitted as a part of it
+    if u.size < 200 or not (unlike or _light_is_missed(u, v, image, back, beside, look)):
+        return None
+    found = _beside_even(u, v, image, back, look)
+    return found or (_beside_patterned(u, v, image, back, look) if look.even else None)
+
+
+def _beside_even(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, look: Look) -> Shaded | None:
+    """By a disc and a soft darker disc behind it."""
+    contrast = look.contrast or float(np.median(image) - np.median(back))
+    size = look.radius_px
+    alone = np.array([0, 0, size, look.edge_px, np.median(back) + contrast, 0, 0, 1.0, 0, size, 0, size, 3.0])
+    steps = np.array([1e-3, 1e-3, 1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3])
+
+    def fit(start: np.ndarray, free: range, every: int, turns: int) -> tuple[np.ndarray, float]:
+        some = slice(None, None, every)
+
+        def rest(values: np.ndarray) -> np.ndarray:
+            return _CLEAR * np.arcsinh((image[some] - _model(values, u[some], v[some], back[some])) / _CLEAR)
+
+        least = least_squares(rest, start, steps, free, turns=turns)
+        return (start, np.inf) if least is None else (least.values, least.chi2 / least.rest.size)
+
+    _, without = fit(alone, range(8), 1, 12)
+    starts = []
+    for far in (0.5 * size, 1.3 * size):
+        for angle in np.arange(8) * np.pi / 4:
+            start = alone.copy()
+            right, down = far * np.cos(angle), far * np.sin(angle)
+            start[:2] = -0.2 * right, -0.2 * down  # the bob alone was drawn towards its shadow
+            start[8:11] = right, down, 0.3
+            starts.append(fit(start, range(13), 4, 4))
+    start = alone.copy()
+    start[8:11] = *_rest_beside(u, v, image, back, size), 0.3
+    starts += [fit(s, range(13), 4, 4) for s in (start, _exchanged(start))]
+    starts.sort(key=lambda s: s[1])
+    tries = [min((fit(start, range(13), 1, 15) for start, _ in starts[:2]), key=lambda s: s[1])]
+    values, with_it = tries[0]
+    if abs(values[12]) < abs(values[3]):  # the bob has the sharper edge: they may have been taken for each other
+        other = fit(_exchanged(values), range(13), 1, 15)
+        tries.insert(0 if other[1] < _ALIKE * with_it else 1, other)
+    most = (0.75 if look.even else 0.7) * without
+    found = (_read(values, look, back) for values, with_it in tries if with_it <= most)
+    return next((shaded for shaded in found if shaded is not None), None)
+
+
+def _read(values: np.ndarray, look: Look, back: np.ndarray) -> Shaded | None:
+    """The shadow that these values of the model mean; None where they mean none that could be."""
+    cx, cy, radius, edge, shade, _, _, gain, right, down, strength, shadow_px, soft = (float(a) for a in values)
+    shadow = Shadow(right, down, shadow_px, abs(soft), strength)
+    far = float(np.hypot(right, down))
+    least = 0.25 if look.even else 0.5  # a pattern may look a little like a shadow behind most of the bob
+    plausible = (
+        0.03 < strength < 0.95
+        and 0.6 < shadow_px / radius < 1.6
+        and 0.6 < radius / look.radius_px < 1.3
+        and shadow.soft_px > max(0.3, 0.6 * abs(edge))
+        and radius + 1 < far + shadow_px < 6 * radius
+        and far > least * radius
+    )
+    wall = gain * float(np.median(back))
+    contrast = shade - wall
+    # two discs of one shade and one edge are one bob that the lens draws out
+    drawn_out = abs(contrast + strength * wall) < 0.15 * abs(contrast) and abs(soft) < 1.5 * abs(edge)
+    if drawn_out or not plausible:
+        return None
+    return Shaded(shadow, cx, cy, radius, max(0.35, abs(edge)), contrast)
+
+
+def _beside_patterned(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, look: Look) -> Shaded | None:
+    """The shadow was taken for the bob, which is beside it and may look like anything: by a soft darker disc, and another in
+    which nothing is explained, so small as may be."""
+    size = look.radius_px
+    start = np.array([*_rest_beside(u, v, image, back, size), size, 1.0, 0, 0, 0.3, size, max(look.edge_px, 1.0)])
+    steps = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3])
+
+    def parts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        cx, cy, radius, gain, sx, sy, strength, shadow_px, soft = values
+        bob = _covered(np.hypot(u - cx, v - cy), radius, 0.7)
+        wall = gain * back * (1 - strength * _covered(np.hypot(u - sx, v - sy), shadow_px, soft))
+        return bob, _CLEAR * np.arcsinh((image - wall) / _CLEAR)
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        bob, off = parts(values)
+        return np.concatenate([(1 - bob) * off, _OWN * np.sqrt(bob)])
+
+    least = least_squares(rest, start, steps, range(9), turns=15)
+    if least is None:
+        return None
+    cx, cy, radius, gain, sx, sy, strength, shadow_px, soft = (float(a) for a in least.values)
+    bob, off = parts(least.values)
+    beyond, within = off[bob < 0.5], off[bob > 0.5]
+    found = (
+        within.size > 50
+        and np.sqrt(np.mean(beyond**2)) < min(0.5 * _OWN, 0.25 * np.sqrt(np.mean(within**2)))
+        and np.hypot(sx, sy) < 0.3 * size
+        and abs(soft) > _SHADOWY_PX
+        and 0.05 < strength < 0.95
+        and 0.6 < shadow_px / radius < 1.6
+        and np.hypot(cx - sx, cy - sy) > shadow_px  # nearer, it may be a bob that the lens draws out
+    )
+    if not found:
+        return None
+    away = (image - gain * back)[bob > 0.5]
+    contrast = float(np.mean(away[np.abs(away) >= np.median(np.abs(away))]))
+    return Shaded(Shadow(sx - cx, sy - cy, shadow_px, abs(soft), strength), cx, cy, radius, 0.7, contrast)
+
+
+def _pixels(
+    seen: list[tuple[Patch, Guess]], look: Look
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Some pixels of the patches but for the string: places relative to the guess, picture in the background's light, background,
+    and whether that was seen there."""
+    bare = []
+    for patch, guess in seen:
+        rows, columns = np.ogrid[: patch.image.shape[0], : patch.image.shape[1]]
+        u, v = columns + patch.x_px - guess.x_px, rows + patch.y_px - guess.y_px
+        held = np.isfinite(guess.string_rad)
+        ux, uy = (float(f(guess.string_rad)) if held else 0.0 for f in (np.cos, np.sin))
+        along, across = u * ux + v * uy, np.abs(u * uy - v * ux)
+        bare.append(np.argwhere((along < 0.5 * look.radius_px) | (across > 5 + 0.1 * look.radius_px)))
+    every = max(1, sum(len(places) for places in bare) // _PIXELS)
+    taken, passed = [np.empty((5, 0))], 0
+    for (patch, guess), places in zip(seen, bare):
+        rows, columns = places[-passed % every :: every].T
+        passed += len(places)
+        u, v = columns + patch.x_px - guess.x_px, rows + patch.y_px - guess.y_px
+        evened = patch.image * (rim_level(patch.back) / max(rim_level(patch.image), 1.0))
+        taken.append(np.array([u, v, *(picture[rows, columns] for picture in (evened, patch.back, patch.seen))]))
+    u, v, image, back, times = np.concatenate(taken, axis=1)
+    return u, v, image, back, times > 0
+
+
+def _rest_beside(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, size: float) -> tuple[float, float]:
+    """The middle of what differs from the background and is not the bob."""
+    differs = np.maximum(np.abs(image - back) - _CLEAR, 1e-6) * (np.hypot(u, v) > 1.2 * size)
+    return float(np.average(u, weights=differs)), float(np.average(v, weights=differs))
+
+
+def _light_is_missed(
+    u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, beside: np.ndarray, look: Look
+) -> bool:
+    """Is it darker beside the bob, on one side of it, than where the bob is not?"""
+    near = np.hypot(u, v) / look.radius_px
+    ring = beside & (near > 1.1 + look.edge_px / look.radius_px) & (near < 2.2)
+    side = (np.arctan2(v, u) * 4 / np.pi).astype(int) % 8
+    light = [
+        np.median((image / np.maximum(back, 1.0))[ring & (side == k)])
+        for k in range(8)
+        if (ring & (side == k)).sum() > 8
+    ]
+    return len(light) >= 4 and bool(min(light) < np.median(light) - _DARK or np.median(light) < 1 - 2 * _DARK)
+
+
+def _model(values: np.ndarray, u: np.ndarray, v: np.ndarray, back: np.ndarray) -> np.ndarray:
+    cx, cy, radius, edge, shade, shade_x, shade_y, gain, right, down, strength, size, soft = values
+    x, y = u - cx, v - cy
+    bob = _covered(np.hypot(x, y), radius, edge)
+    wall = gain * back * (1 - strength * _covered(np.hypot(x - right, y - down), size, soft))
+    return wall * (1 - bob) + (shade + shade_x * x + shade_y * y) * bob
+
+
+def _exchanged(values: np.ndarray) -> np.ndarray:
+    """The model with the bob where its shadow was, and the other way round."""
+    cx, cy, radius, edge, shade, _, _, gain, right, down, strength, size, soft = values
+    return np.array([cx + right, cy + down, size, soft, shade, 0, 0, gain, -right, -down, strength, radius, edge])
+
+
+def _covered(distance: np.ndarray, radius: float, edge: float) -> np.ndarray:
+    from scipy.special import ndtr
+
+    covered: np.ndarray = ndtr((radius - distance) / np.hypot(edge, 0.2))
+    return covered
