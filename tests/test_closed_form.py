@@ -7,7 +7,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from toolkit.errors import UsageError
@@ -167,6 +167,7 @@ numbers = st.floats(-2, 2)
 
 @settings(max_examples=60, deadline=None)
 @given(numbers, numbers, st.floats(0, 3), st.floats(0.1, 3), numbers, st.floats(0, 3), st.floats(0.01, 20))
+@example(0.0, 0.0, 2.2e-311, 1.0, 1.0, 1.0, 0.5)  # at resonance, with a damping that is hardly a number
 def test_a_motion_may_be_stopped_and_taken_up_again(theta0, omega0, alpha, omega_g, a, omega_f, stop):
     whole = solve_linear(np.array([stop, stop + 3.0]), theta0, omega0, alpha, omega_g, a, omega_f)
     half = whole.theta_rad[0], whole.omega_rad_per_s[0]

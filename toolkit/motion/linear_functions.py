@@ -196,7 +196,8 @@ def _complete_symmetric(nodes: tuple[complex, ...]) -> list[complex]:
 
 def _phi1(z: np.ndarray) -> np.ndarray:
     """(e^z − 1)/z."""
-    return np.where(z == 0, 1.0, np.expm1(z) / np.where(z == 0, 1.0, z))
+    none = np.abs(z) < 1e-17  # there it rounds to 1; the quotient of two subnormal numbers may overflow
+    return np.where(none, 1.0, np.expm1(z) / np.where(none, 1.0, z))
 
 
 def _phi2(z: np.ndarray) -> np.ndarray:
