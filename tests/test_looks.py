@@ -54,22 +54,48 @@ def test_the_exposure_is_told_by_the_streak(exposure_s, lag):
     assert found.look.even
 
 
+def growing(x, speed, size, walls=None):
+    """A dark bob of these sizes seen at these places, before a wall of 180, or of these greys though 180 was learned."""
+    rows, columns = np.mgrid[0:100, 0:160]
+    rng = np.random.default_rng(6)
+    bobs = [ndtr((r - np.hypot(columns - a, rows - 50)) / EDGE) for a, r in zip(x, size)]
+    grey = np.full(x.size, 180.0) if walls is None else walls
+    pictures = [(g + (70 - g) * bob + rng.normal(0, 1.5, bob.shape)).astype(np.float32) for g, bob in zip(grey, bobs)]
+    often = np.full((100, 160), 9, np.float32)
+
+    def show(k, *_):
+        return Guess(x[k], 50.0), Patch(pictures[k], np.full((100, 160), grey[k], np.float32), often, 0, 0)
+
+    return Sightings(x, 50 + 0 * x, 0 * x, speed, show)
+
+
 def test_a_size_that_grows_is_learned_though_the_bob_turns_beyond_the_rim():
     """Nearer to the camera on the right, where its slowest frames show only a part of it."""
     speed = np.abs(np.linspace(-1, 1, 40)) ** 0.5 * -300 + 300  # slow at both ends
     x = np.linspace(20, 158, 40)
     speed[x < 80] *= 0.3
-    size = 11.0 + 0.02 * x
-    rows, columns = np.mgrid[0:100, 0:160]
-    rng = np.random.default_rng(6)
-    bobs = [ndtr((r - np.hypot(columns - a, rows - 50)) / EDGE) for a, r in zip(x, size)]
-    pictures = [(180 - 110 * bob + rng.normal(0, 1.5, bob.shape)).astype(np.float32) for bob in bobs]
-    wall, often = np.full((100, 160), 180, np.float32), np.full((100, 160), 9, np.float32)
-    seen = Sightings(
-        x, 50 + 0 * x, 0 * x, speed, lambda k, *_: (Guess(x[k], 50.0), Patch(pictures[k], wall, often, 0, 0))
-    )
-    found = learn_looks(seen, Look(12.0, 1.0, -105.0, 8.0), None, 1e-4, (100, 160))
+    found = learn_looks(growing(x, speed, 11.0 + 0.02 * x), Look(12.0, 1.0, -105.0, 8.0), None, 1e-4, (100, 160))
     assert found.look.radius_free
+    assert found.growth[0] == pytest.approx(0.02, abs=0.003)
+
+
+def test_a_size_that_grows_much_stays_known():
+    """Seen more often where it is small: learned as of the size it has there, it is not to be lost where it is large."""
+    x = np.concatenate([np.linspace(22, 50, 22), np.linspace(115, 140, 14)])
+    size = 14.0 + 0.03 * x
+    found = learn_looks(growing(x, 0 * x + 20.0, size), Look(15.8, 1.0, -105.0, 8.0), None, 1.0, (100, 160))
+    assert found.growth is not None
+    assert found.growth[0] == pytest.approx(0.03, abs=0.003)
+
+
+def test_a_size_that_grows_is_learned_though_something_dark_passes_where_the_bob_turns():
+    """There it has another contrast, and tells nothing; where it is faster on that side it does."""
+    speed = np.abs(np.linspace(-1, 1, 40)) ** 0.5 * -300 + 300
+    x = np.linspace(24, 140, 40)
+    walls = np.where(x > 129, 105.0, 180.0)
+    size = np.where(x > 129, 14.0, 11.0 + 0.02 * x)
+    found = learn_looks(growing(x, speed, size, walls), Look(12.0, 1.0, -105.0, 8.0), None, 1e-4, (100, 160))
+    assert found.growth is not None
     assert found.growth[0] == pytest.approx(0.02, abs=0.003)
 
 

@@ -16,7 +16,7 @@ from toolkit.tracking.begin.trail import Rough, cut
 from toolkit.tracking.geometry.swing import CALM, Swing, fit_swing
 from toolkit.tracking.picture.background import Background
 from toolkit.tracking.picture.front import EVEN, Rhythm, find_front, fit_each, is_clear, typical
-from toolkit.tracking.picture.looks import Looks, Sightings, learn_looks
+from toolkit.tracking.picture.looks import Looks, Sightings, grown, learn_looks
 from toolkit.tracking.picture.plane import still_picture
 from toolkit.tracking.picture.shadow import Shaded, Shadow, find_shadow
 from toolkit.tracking.picture.sight import LUMA, Sight, maybe_shadow
@@ -347,7 +347,7 @@ class Known:
         for i, vx, vy in zip(points, *(v * self.exposure_s for v in velocity)):
             guess = self._guess(*points[i], float(vx), float(vy))
             patch = self._patch(batch[i], self.look, guess)
-            place = NOWHERE if patch is None else localiser.locate(patch, self.look, guess)
+            place = NOWHERE if patch is None else localiser.locate(patch, self.look_at(guess), guess)
             place, _ = self._beside_shadow(localiser, batch[i], guess, place) or (place, patch)
             if np.isfinite(place.x_px) and place.visible > (_HARDLY if self.bold else _SHOWS):
                 places[i] = place
@@ -401,10 +401,7 @@ class Known:
 
     def look_at(self, guess: Guess) -> Look:
         """The bob's looks at a place: nearer to the camera it is larger."""
-        if self.growth is None or not self.look.radius_free:
-            return self.look
-        size = self.growth[0] * guess.x_px + self.growth[1]
-        return self.look._replace(radius_px=float(np.clip(size, 0.75 * self.look.radius_px, 1.3 * self.look.radius_px)))
+        return grown(self.look, self.growth, guess.x_px)
 
     def _beside_shadow(
         self, localiser: Localiser, frame: Frame, guess: Guess, place: Place

@@ -12,6 +12,7 @@ from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import Guess, Look, Patch
 
 _SURE, _GROWN_PX = 6.0, 0.4  # standard deviations, and over the whole swing: so much the bob grows where it nears
+_FEW = 3  # sightings: fewer tell no size on one side of the swing
 _BESIDE = 0.4  # of the radius: so far from where the bob was seen it is not
 _MANY = 4000  # pixels of a patch: a part of more tells its light as well
 # what `fit_disc` gives
@@ -74,21 +75,31 @@ def learn_looks(
 ) -> Looks | None:
     """The looks of the bob seen, from about `look`; its `radius` if that is known. None where hardly a fit succeeds."""
     speed = np.hypot(seen.vx, seen.vy)
-    slow = _slow(seen, speed, look.radius_px, shape)
+    sides = _sides(seen, np.argsort(speed), look.radius_px, shape)
+    slow = _slow(speed, sides)
     fast = np.argsort(-speed)[:10]
     walls = [w for w in (seen.noise(k, look) for k in slow[::2]) if np.isfinite(w)]
     drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(walls or [0.0]))  # more misfit than noise leaves
     found_px, learned = look.radius_px, Looks(look)
 
-    def sized(look: Look, exposure_s: float) -> dict[int, np.ndarray]:
-        fits = ((int(k), seen.fit(k, look, exposure_s, calibrate=True, turns=8)) for k in slow)
+    def fitted(look: Look, sightings: np.ndarray) -> dict[int, np.ndarray]:
+        near = ((int(k), grown(look, learned.growth, float(seen.x_px[k]))) for k in sightings)
+        fits = ((k, seen.fit(k, its, learned.exposure_s, calibrate=True, turns=8)) for k, its in near)
         return {k: f for k, f in fits if f is not None and (radius or _whole(f, found_px, shape))}
 
+    def sized(look: Look) -> dict[int, np.ndarray]:
+        fits = fitted(look, slow)
+        alike = _of_one_contrast(fits)
+        for side in sides:  # where something passes behind the bob as it turns, the next slowest tell
+            if sum(k in alike for k in side.tolist()) < _FEW:
+                fits |= fitted(look, side[~np.isin(side, slow)][:8])
+        return fits
+
     for turn in range(2):  # the streak widens the edge, the edge shortens the streak
-        fits = sized(look, learned.exposure_s)
+        fits = sized(look)
         if look.even and (len(fits) < 3 or np.median([f[_WITHIN] for f in fits.values()]) > drawn):
             patterned = look._replace(even=False)  # a pattern or a highlight: the outline alone counts
-            outlined = sized(patterned, learned.exposure_s)
+            outlined = sized(patterned)
             if len(fits) >= 3 or len(outlined) >= 3:
                 look, fits = patterned, outlined
         if len(fits) < 3 and turn == 0:
@@ -100,25 +111,44 @@ def learn_looks(
             return Looks(look._replace(radius_free=False))  # a pattern up to the outline: it tells no size, no streak
         if speed.max() * interval_s < 1.0:
             break
-        exposure_s = _exposure(seen, look, fast, interval_s, learned.exposure_s if turn else None)
+        exposure_s = _exposure(seen, learned, fast, interval_s, learned.exposure_s if turn else None)
         if exposure_s is None:
             break
         learned = learned._replace(exposure_s=exposure_s)
     return learned
 
 
-def _slow(seen: Sightings, speed: np.ndarray, radius_px: float, shape: tuple[int, ...]) -> np.ndarray:
-    """Up to 16 sightings on which the bob is slow, whole in the picture; where hardly one of them is on the left, or on the
-    right, as many from either side, for the bob may be larger there."""
+def grown(look: Look, growth: tuple[float, float] | None, x_px: float) -> Look:
+    """The bob's looks at a place: nearer to the camera it is larger."""
+    if growth is None or not look.radius_free:
+        return look
+    size = growth[0] * x_px + growth[1]
+    return look._replace(radius_px=min(max(size, 0.75 * look.radius_px), 1.3 * look.radius_px))
+
+
+def _sides(seen: Sightings, order: np.ndarray, radius_px: float, shape: tuple[int, ...]) -> list[np.ndarray]:
+    """Of these sightings those on the left and those on the right, whole in the picture."""
     rim = np.min([seen.x_px, seen.y_px, shape[1] - 1 - seen.x_px, shape[0] - 1 - seen.y_px], axis=0)
-    order = np.argsort(speed)
-    slow = order[: max(8, speed.size // 4)]
-    slow = slow[:: max(1, slow.size // 16)][:16]
     whole, left = rim >= radius_px + 2, seen.x_px < np.median(seen.x_px)
-    sides = [order[whole[order] & side[order]] for side in (left, ~left)]
-    if min(np.count_nonzero(whole[slow] & left[slow]), np.count_nonzero(whole[slow] & ~left[slow])) >= 4:
+    return [order[whole[order] & side[order]] for side in (left, ~left)]
+
+
+def _slow(speed: np.ndarray, sides: list[np.ndarray]) -> np.ndarray:
+    """Up to 16 sightings on which the bob is slow; where hardly one of them is whole on the left, or on the right, as many from
+    either of these `sides`, for the bob may be larger there."""
+    slow = np.argsort(speed)[: max(8, speed.size // 4)]
+    slow = slow[:: max(1, slow.size // 16)][:16]
+    if min(np.isin(side, slow).sum() for side in sides) >= 4:
         return slow
     return np.concatenate([side[:8] for side in sides]) if min(map(len, sides)) >= 4 else slow
+
+
+def _of_one_contrast(fits: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """Those of about the usual contrast: the others ran away, or something else stands behind the bob."""
+    if not fits:
+        return fits
+    usual = sorted(f[_CONTRAST] for f in fits.values())[len(fits) // 2]
+    return {k: f for k, f in fits.items() if 0.5 < f[_CONTRAST] / usual < 2.0}
 
 
 def _whole(fit: np.ndarray, found_px: float, shape: tuple[int, ...]) -> bool:
@@ -133,15 +163,14 @@ def _size(
 ) -> tuple[Look, tuple[float, float] | None]:
     """The looks that most fits agree on; and the line along which the radius grows, where the bob is larger on one side."""
     x_px = seen.x_px
-    usual = sorted(f[_CONTRAST] for f in fits.values())[len(fits) // 2]
-    fits = {k: f for k, f in fits.items() if 0.5 < f[_CONTRAST] / usual < 2.0}  # the others ran away
+    fits = _of_one_contrast(fits)
     table = np.array(list(fits.values()))
     middle = np.median(table, axis=0)
     size, edge, contrast, noise = (float(middle[n]) for n in (_RADIUS, _EDGE, _CONTRAST, _MISFIT))
     look = look._replace(radius_px=radius or size, edge_px=max(0.35, edge), contrast=contrast, noise=noise)
     sizes, where = table[:, _RADIUS], x_px[list(fits)]
     left = where < float(np.median(x_px))
-    if radius or not 3 <= left.sum() <= left.size - 3:
+    if radius or not _FEW <= left.sum() <= left.size - _FEW:
         return look._replace(radius_free=False), None
     spread = np.hypot(sizes[left].std() / np.sqrt(left.sum()), sizes[~left].std() / np.sqrt((~left).sum()))
     if abs(sizes[left].mean() - sizes[~left].mean()) <= max(0.05, 4 * spread):
@@ -161,7 +190,9 @@ def _nears(sizes: np.ndarray, x_px: np.ndarray, vx: np.ndarray, range_vx: float)
     return bool(abs(values[2]) > _SURE * sigma and abs(values[2]) * range_vx > _GROWN_PX)
 
 
-def _exposure(seen: Sightings, look: Look, fast: np.ndarray, interval_s: float, about_s: float | None) -> float | None:
+def _exposure(
+    seen: Sightings, learned: Looks, fast: np.ndarray, interval_s: float, about_s: float | None
+) -> float | None:
     """The exposure whose streak fits the fastest sightings best, looked for from `about_s` on where that is known; None where
     hardly one is fitted.
 
@@ -169,12 +200,13 @@ def _exposure(seen: Sightings, look: Look, fast: np.ndarray, interval_s: float, 
     """
     trials = np.linspace(0, 1, 11)
     cost = np.full((trials.size, fast.size), np.nan)
+    looks = [grown(learned.look, learned.growth, x) for x in seen.x_px[fast].tolist()]
     tried: set[int] = set()
     wanted = {0, 3, 6} if about_s is None else {round(10 * about_s / interval_s)}
     while wanted - tried:  # until what is best has no untried neighbour
         for j in sorted(wanted - tried):
             for n, k in enumerate(fast):
-                fit = seen.fit_from_far(k, look, trials[j] * interval_s)
+                fit = seen.fit_from_far(k, looks[n], trials[j] * interval_s)
                 if fit is not None and fit[_VISIBLE] > 0.5:
                     cost[j, n] = fit[_MISFIT] ** 2
         tried |= wanted
