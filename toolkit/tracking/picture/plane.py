@@ -13,7 +13,7 @@ _EVEN = 0.003  # of their light: so far most rows go before it is called uneven
 def shrink(plane: np.ndarray, factor: int) -> np.ndarray:
     """`plane` (h, w) uint8 averaged over factor × factor pixels, float32. Pixel (i, j) is centred on (i + ½)·factor − ½."""
     if factor == 1:
-        return plane.astype(np.float32)
+        return plane.astype(np.float32, order="C")
     plane = plane if plane.strides[1] == 1 and plane.dtype == np.uint8 else np.ascontiguousarray(plane, np.uint8)
     rows, columns = plane.shape[0] // factor, plane.shape[1] // factor
     small, row = np.empty((rows, columns), np.float32), np.empty(columns * factor, np.float32)
@@ -26,7 +26,7 @@ def still_picture(planes: list[np.ndarray]) -> np.ndarray:
     """The median of each pixel over the planes (h, w): what stands still, where nothing covers it half the time."""
     import cv2
 
-    middle = np.empty_like(planes[0])
+    middle = np.empty(planes[0].shape, planes[0].dtype)
     for top in range(0, middle.shape[0], _ROWS):
         lines = [plane[top : top + _ROWS] for plane in planes]
         for i in range(len(lines) // 2 + 1):  # a bubble sort as far as the middle: many pixels at a time

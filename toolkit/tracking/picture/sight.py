@@ -31,7 +31,7 @@ class Sight:
     def window(self, frame: Frame, x0: int, y0: int, x1: int, y1: int) -> np.ndarray:
         """(y1 − y0, x1 − x0) float32 of the frame's columns x0 … x1 − 1 and rows y0 … y1 − 1."""
         if self.weights == LUMA:
-            return frame.luma[y0:y1, x0:x1].astype(np.float32)
+            return frame.luma[y0:y1, x0:x1].astype(np.float32, order="C")  # turned pictures too
         wy, wu, wv = self.weights
         window = np.full((y1 - y0, x1 - x0), 128.0, np.float32)
         if wy:
@@ -50,7 +50,7 @@ def _enlarged(plane: np.ndarray, shape: tuple[int, ...], x0: int, y0: int, x1: i
 
     fy, fx = round(shape[0] / plane.shape[0]), round(shape[1] / plane.shape[1])
     if fx == 1 and fy == 1:
-        return plane[y0:y1, x0:x1].astype(np.float32)
+        return plane[y0:y1, x0:x1].astype(np.float32, order="C")
     sx, sy = 0.5 * (fx - 1) / fx, 0.5 * (fy - 1) / fy
     u0, v0 = max(0, x0 // fx - 2), max(0, y0 // fy - 2)
     u1, v1 = min(plane.shape[1], x1 // fx + 3), min(plane.shape[0], y1 // fy + 3)
