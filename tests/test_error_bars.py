@@ -125,6 +125,10 @@ def test_a_string_is_found_though_the_pivot_is_not_known_well(wrong_px):
     truth = np.arctan2(bob[0] - pivot[0], bob[1] - pivot[1])
     assert line is not None
     assert line.angle_rad == pytest.approx(truth, abs=5 * line.sigma_angle_rad + 2e-4)
+    for slope in (line.slope, line.slope + 0.004, 0.3):  # where it was thought to be of late, nearly there, elsewhere
+        again = measure_string(luma, bob, (pivot[0] + wrong_px, pivot[1]), radius, before=line._replace(slope=slope))
+        assert again is not None
+        assert 260.0 * abs(again.angle_rad - line.angle_rad) < 0.06  # px: both end within 0.03 of the best
     half = seen_half(np.hypot(line.x_px - bob[0], line.y_px - bob[1]), radius)
     assert half == pytest.approx(0.5 * (np.hypot(280.0, 50.0) - 1.15 * radius - 10.0), abs=12.0)
 

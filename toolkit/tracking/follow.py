@@ -21,7 +21,7 @@ from toolkit.tracking.picture.plane import silhouette
 from toolkit.tracking.picture.repeat import alike, thinned
 from toolkit.tracking.picture.spots import tell_bob
 from toolkit.tracking.picture.stillness import CameraShift
-from toolkit.tracking.picture.string_line import measure_string
+from toolkit.tracking.picture.string_line import StringLine, measure_string
 from toolkit.video import Frame
 
 # frames: so often the string, and its pull on the bob's place, are measured, and for so long; then ever less often
@@ -76,6 +76,7 @@ class Follower(Known):
         self._unlike_seen = self._usually_unlike = np.nan
         self._speed = 0.0  # of the bob on it, px/s
         self._lit: tuple[float, Frame | None] = (nan, None)  # the bob's brightness lately, and on which picture
+        self._string: StringLine | None = None  # as it was measured last
         # no background shows how the camera moves, and the bob strays: then the string is measured on every frame
         self.unsteady = len(self.anchors) < 2 and self.swing.rms_px > _UNSTEADY_PX
 
@@ -434,7 +435,9 @@ class Follower(Known):
         dx, dy = shift.at(place.x_px, place.y_px)
         qx, qy = shift.at(px, py)
         bob = (place.x_px + dx, place.y_px + dy)
-        line = measure_string(frame.luma, bob, (px + qx, py + qy), self.look.radius_px, self.unsteady)
+        before = None if self.unsteady else self._string
+        line = measure_string(frame.luma, bob, (px + qx, py + qy), self.look.radius_px, self.unsteady, before)
+        self._string = line
         if self.unsteady:  # what a hand makes of a small swing tells no direction: or about straight down
             other = measure_string(frame.luma, bob, (bob[0], 0.0), self.look.radius_px)
             line = max((one for one in (line, other) if one is not None), key=lambda one: one.strength, default=None)

@@ -9,10 +9,10 @@ from toolkit.motion.kernels.pointer import greys, reals, skip
 from toolkit.tracking._sine import part
 
 # The caller's places: addresses of the picture and of the numbers (bob x and y, pivot x and y, radius, how far from the bob
-# to start), then of the result and of room to work in; then the picture's rows and columns, and bytes from one row and
+# to start, the slope against the pivot's direction if it is known, else NaN), then of the result and of room to work in; then the picture's rows and columns, and bytes from one row and
 # from one column to the next.
 # result : 1 if a string was found; a point on it, its direction from bob to pivot (x, y), the uncertainties of direction
-# and place, the ridge's height over its own uncertainty.
+# and place, the ridge's height over its own uncertainty, the slope against the pivot's direction.
 PICTURE, NUMBERS, RESULT, ROOM, ROWS, COLUMNS, DOWN, RIGHT = range(8)
 STRIPS, STRIP, SLOPES = 24, 65, 26  # sections and their pixels for the first look; slopes tried to either side
 SECTIONS, HALF, ENDS = 100, 5, 8  # sections at most; pixels to either side that the ridge, and its section, reach
@@ -71,7 +71,7 @@ def clearest(places: Any, strips: Any, bx: float, by: float, ux: float, uy: floa
 
 
 def ridge(places: Any) -> None:
-    """Fit the line, first on the piece near the bob, then on longer ones."""
+    """Fit the line, first on the piece near the bob, then on longer ones; where its slope is known on the whole at once."""
     numbers, result, rest_of = reals(places, NUMBERS), reals(places, RESULT), reals(places, ROOM)
     shape = skip(rest_of, SPARE - 2 * _WIDE - 2 * ENDS)  # of the ridge
     profile = skip(shape, _WIDE)
@@ -90,9 +90,11 @@ def ridge(places: Any) -> None:
         square += shape[j] * shape[j]
     far = length - 4.0
     a, middle = 0.0, 0.0  # the line: across = a + b (along − middle)
-    b = clearest(places, rest_of, bx, by, ux, uy, start, start + 60.0 if start + 60.0 < far else far)
+    b, first = numbers[6], 2
+    if b != b:
+        b, first = clearest(places, rest_of, bx, by, ux, uy, start, start + 60.0 if start + 60.0 < far else far), 0
     height = strength = noise = n00 = n01 = n11 = 0.0
-    for stage in range(3):
+    for stage in range(first, 3):
         least = STILL if stage == 2 else NEAR
         end = start + (60.0 if stage == 0 else 200.0 if stage == 1 else length)
         end = end if end < far else far
@@ -178,3 +180,4 @@ def ridge(places: Any) -> None:
     result[5] = noise / math.sqrt(least if least > 1e-30 else 1e-30)
     result[6] = noise / math.sqrt(n00)
     result[7] = strength
+    result[8] = b

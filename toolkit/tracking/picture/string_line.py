@@ -17,8 +17,8 @@ from toolkit.motion.compiled import address, call, kernel
 
 class StringLine(NamedTuple):
     """A point on the string (px), the direction pivot → bob (rad from the downward image axis, positive to the
-    right), the standard uncertainties of the direction and of the line's place at the point, and the ridge's height
-    over its own uncertainty."""
+    right), the standard uncertainties of the direction and of the line's place at the point, the ridge's height
+    over its own uncertainty, and by how much (tangent) the line leaves the direction in which the pivot was thought to be."""
 
     x_px: float
     y_px: float
@@ -26,27 +26,38 @@ class StringLine(NamedTuple):
     sigma_angle_rad: float
     sigma_px: float
     strength: float
+    slope: float
 
 
 _ROOM = 4096  # numbers that the kernel works in, and more
+_AS_CLEAR = 0.7  # times the line of late: one that is less clear where that was may be no string
 
 
 def measure_string(
-    luma: np.ndarray, bob: tuple[float, float], pivot: tuple[float, float], radius_px: float, far: bool = False
+    luma: np.ndarray,
+    bob: tuple[float, float],
+    pivot: tuple[float, float],
+    radius_px: float,
+    far: bool = False,
+    before: StringLine | None = None,
 ) -> StringLine | None:
     """The string in one frame from where bob and pivot are thought to be; None where no string is seen. It is looked for as far
-    as the pivot or, where that is farther (or with `far`, whatever it is), the picture's rim."""
+    as the pivot or, where that is farther (or with `far`, whatever it is), the picture's rim. `before`, the line on a frame of
+    late, tells about its slope: it is looked for there first."""
     reach = _to_rim(luma.shape, bob, pivot)
     if far or reach < 1.0:
         pivot = bob[0] + reach * (pivot[0] - bob[0]), bob[1] + reach * (pivot[1] - bob[1])
-    numbers, out, room = np.array([*bob, *pivot, radius_px, _start(radius_px)]), np.zeros(8), np.empty(_ROOM)
+    slope = math.nan if before is None else before.slope
+    numbers, out, room = np.array([*bob, *pivot, radius_px, _start(radius_px), slope]), np.zeros(9), np.empty(_ROOM)
     addresses = luma.ctypes.data, address(numbers), address(out), address(room)
     ridge = kernel("ridge", "toolkit.tracking.picture._string_kernel", "the string's measurement")
     call(ridge, *addresses, *luma.shape, *luma.strides)
-    found, x, y, along_x, along_y, sigma_angle, sigma, strength = out.tolist()
+    found, x, y, along_x, along_y, sigma_angle, sigma, strength, slope = out.tolist()
+    if before is not None and not (found and strength > _AS_CLEAR * before.strength):
+        return measure_string(luma, bob, pivot, radius_px, far)
     if not (found and strength > 8 and np.all(np.isfinite(out))):
         return None
-    return StringLine(x, y, math.atan2(-along_x, -along_y), sigma_angle, sigma, strength)
+    return StringLine(x, y, math.atan2(-along_x, -along_y), sigma_angle, sigma, strength, slope)
 
 
 def seen_half(distance_px: np.ndarray, radius_px: float) -> np.ndarray:
