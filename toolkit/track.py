@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice, pairwise
 from pathlib import Path
@@ -41,6 +42,8 @@ from toolkit.tracking.picture.string_line import seen_half
 from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
+
+_BYTES_ASIDE = 1e7  # of luma: what is decoded while the bob is searched for; each new frame costs memory, which takes time too
 
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
 
@@ -158,15 +161,18 @@ def _begin(
             _require_frames(batch, video)
         elif len(batch) < 12:
             break
+        more = int(_BYTES_ASIDE / batch[0].luma.size) if every == 1 else 0
         try:
-            rough = find_bob(batch, bob, radius, str(video.path))
-            follower = Follower(batch, rough, pivot, radius, localiser)
+            with ThreadPoolExecutor(1) as aside:  # other processors decode on while this one searches
+                later = aside.submit(list, islice(used, more))
+                rough = find_bob(batch, bob, radius, str(video.path))
+                follower = Follower(batch, rough, pivot, radius, localiser)
         except JobError as error:
             first = first or error
             continue
         if every == 1:
             follower.first = batch
-            return follower, chain(batch, used)
+            return follower, chain(batch, later.result(), used)
         follower.interval_s /= every
         follower.exposure_s = min(follower.exposure_s, follower.interval_s)
         return follower, _between(iter(video), start_s, stop_s)
