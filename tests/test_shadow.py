@@ -7,9 +7,10 @@ import pytest
 from scipy.special import ndtr
 from test_track import LENGTH, PIVOT, H, W, angles, film
 
+from toolkit import Scene, render
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.picture.shadow import Shadow, find_shadow
+from toolkit.tracking.picture.shadow import Shaded, Shadow, find_shadow, find_shadow_near
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")
@@ -49,6 +50,42 @@ def test_bob_and_shadow_are_told_apart(shadow):
     assert np.all(np.abs(np.subtract(found.shadow, shadow)) < [0.5, 0.5, 0.5, 0.5, 0.03])
     assert np.hypot(found.x_px + 0.3 * shadow[0], found.y_px + 0.3 * shadow[1]) < 0.1
     assert found.radius_px == pytest.approx(12.0, abs=0.1)
+
+
+def test_a_shadow_taken_for_the_lower_half_of_the_bob_is_found():
+    """As dark as the bob, and wholly beside it: one large disc was fitted to both."""
+    shadow = (-3.0, 20.0, 12.0, 2.5, 0.45)
+    found = find_shadow(seen(shadow, (0.5 * shadow[0], 0.5 * shadow[1])), Look(20.8, 1.9, -60.0, 5.0, even=False))
+    assert found is not None
+    assert np.all(np.abs(np.subtract(found.shadow, shadow)) < [0.5, 0.5, 0.5, 0.5, 0.03])
+    assert found.radius_px == pytest.approx(12.0, abs=0.1)
+
+
+def test_a_shadow_found_from_poor_places_is_found_more_closely_from_better_ones():
+    shadow = (-7.0, 8.0, 12.0, 4.0, 0.45)
+    about = Shaded(Shadow(-6.0, 6.5, 10.5, 4.8, 0.36), 1.5, -1.5, 12.6, 1.6, -95.0)
+    found = find_shadow_near(seen(shadow), Look(12.6, 1.6, -95.0, 5.0), about)
+    assert found is not None
+    assert np.all(np.abs(np.subtract(found.shadow, shadow)) < [0.2, 0.2, 0.2, 0.2, 0.015])
+    assert np.hypot(found.x_px, found.y_px) < 0.05
+    assert found.radius_px == pytest.approx(12.0, abs=0.05)
+
+
+def test_a_shadow_that_draws_a_small_bob_another_way_on_either_side_is_taken_out(tmp_path):
+    """A wide swing: on one side the string hides the bob's outline opposite the shadow, on the other that beside it."""
+    camera = {
+        "width_px": 480, "height_px": 360, "fps": 60, "duration_s": 2.4, "px_per_m": 460, "pivot_px": [240, 60], "seed": 3,
+        "focus_blur": {"sigma_px": 2.1}, "string": {"width_px": 4}, "sensor_noise": {"read_sigma": 1.5},
+        "shadow": {"strength": 0.4, "right_px": -7.0, "down_px": 7.0, "softness_px": 5.0},
+        "wall": {"colour_rgb": [165, 165, 165]}, "bob_look": {"colour_rgb": [95, 95, 95]},
+    }  # fmt: skip
+    swing = {"pendulum": {"mass_kg": 0.1, "length_m": 0.5, "bob_radius_m": 0.022}, "release": {"theta0_rad": 1.05}}
+    film_path = tmp_path / "wide.mp4"
+    truth = render(Scene.from_dict({**swing, "camera": camera}), film_path)
+    found = track(film_path)
+    assert (found.status == OK).mean() > 0.95
+    off = np.hypot(found.x_px - truth.x_px, found.y_px - truth.y_px)[found.ok]
+    assert np.sqrt(np.mean(off**2)) < 0.25
 
 
 def test_a_shadow_that_the_rim_of_the_picture_cuts_is_found():

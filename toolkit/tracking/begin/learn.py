@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker, tracker_names
+from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.tracking.begin.acquire import is_even, scattered
 from toolkit.tracking.begin.bold import learn_bold
@@ -18,7 +19,7 @@ from toolkit.tracking.picture.background import Background
 from toolkit.tracking.picture.front import EVEN, Rhythm, find_front, fit_each, is_clear, typical
 from toolkit.tracking.picture.looks import Looks, Sightings, grown, learn_looks
 from toolkit.tracking.picture.plane import still_picture
-from toolkit.tracking.picture.shadow import Shaded, Shadow, find_shadow
+from toolkit.tracking.picture.shadow import Shaded, Shadow, find_shadow, find_shadow_near
 from toolkit.tracking.picture.sight import LUMA, Sight, maybe_shadow
 from toolkit.tracking.picture.stillness import STILL, Anchors, CameraShift
 from toolkit.video import Frame
@@ -31,6 +32,7 @@ _CALMER = 0.85  # times as far strays a bob that is looked at as it is
 _ROUND = 0.75  # of the outline: of a bold pattern's less is to be seen now and then
 # of the outline, at least, where the bob is said to be found; and of one with a bold pattern
 _SHOWS, _HARDLY = 0.6, 0.1
+_CASTS = 2.5, 1.0, 1.0  # the bob's edge is so much softer as it is found with a shadow cast anew each time
 _LESS = 0.8  # of the misfit: by so much a bob with a pattern is explained better with a shadow
 
 
@@ -219,10 +221,12 @@ class Known:
         shaded = self._learn_shadow(batch, alone.look, points)
         if shaded is None or not (shaded.taken_for_bob or self.sight.weights == LUMA):
             return alone, points
-        before, sight, self.sight, self.shadow = self.back, self.sight, Sight(LUMA), shaded.shadow
-        without = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
-        bare = Look(radius or shaded.radius_px, shaded.edge_px, shaded.contrast, alone.look.noise)
-        self._learn_background(batch, bare, without)
+        before, sight, self.sight = self.back, self.sight, Sight(LUMA)
+        bare, without = self._without_shadow(batch, shaded, points, radius)
+        clearer = self._learn_shadow(batch, bare, without, shaded)
+        if clearer is not None:
+            bare, without = self._without_shadow(batch, clearer, without, radius)
+        bare = bare._replace(noise=alone.look.noise)
         looks = self._learn_looks(batch, bare, without, radius)
         less = 1.0 if alone.look.even or looks.look.even else _LESS
         if shaded.taken_for_bob or looks.look.noise < less * alone.look.noise:
@@ -231,16 +235,42 @@ class Known:
         self.back = before
         return alone, points
 
-    def _learn_shadow(self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]]) -> Shaded | None:
-        """The shadow beside a bob of about this look, from the frames on which it is slow."""
+    def _without_shadow(
+        self, batch: list[Frame], shaded: Shaded, points: dict[int, tuple[float, float]], radius: float | None
+    ) -> tuple[Look, dict[int, tuple[float, float]]]:
+        """The looks of the bob alone, and where it is: the shadow drew each point another way, as the string hid another part of
+        both."""
+        self.shadow = shaded.shadow
+        points = {i: (x + shaded.x_px, y + shaded.y_px) for i, (x, y) in points.items()}
+        look = Look(radius or shaded.radius_px, shaded.edge_px, shaded.contrast, np.inf)
+        self._learn_background(batch, look, points)
+        for i, found in points.items():
+            place = found
+            for soften in _CASTS:
+                guess = self._guess(*place, 0.0, 0.0)
+                patch = self._patch(batch[i], look, guess)
+                fit = None if patch is None else fit_disc(patch, look, guess, soften=soften, turns=12)
+                if patch is None or fit is None:
+                    break
+                place = float(fit[0] + patch.x_px), float(fit[1] + patch.y_px)
+            else:
+                if hypot(place[0] - found[0], place[1] - found[1]) < look.radius_px:
+                    points[i] = place
+        return look, points
+
+    def _learn_shadow(
+        self, batch: list[Frame], look: Look, points: dict[int, tuple[float, float]], about: Shaded | None = None
+    ) -> Shaded | None:
+        """The shadow beside a bob of about this look, from the frames on which it is slow; more closely where it is known `about`."""
         numbers = np.array(list(points))
         speed = np.hypot(*self.swing.velocity(np.array([batch[i].t_s for i in numbers])))
         slow = numbers[np.argsort(speed)[: max(10, numbers.size // 3)]]
         slow = slow[:: max(1, slow.size // 10)]
-        before, sight, self.sight = self.back, self.sight, Sight(LUMA)  # in a colour difference a shadow hardly shows
+        before, sight, shadow = self.back, self.sight, self.shadow
+        self.sight, self.shadow = Sight(LUMA), None  # in a colour difference a shadow hardly shows
         if sight != self.sight:
             if not maybe_shadow([batch[i] for i in slow], [points[i] for i in slow], look.radius_px):
-                self.sight = sight
+                self.sight, self.shadow = sight, shadow
                 return None
             look = look._replace(contrast=0.0, noise=np.inf)
             self._learn_background(batch, look, points)
@@ -251,8 +281,8 @@ class Known:
             patch = self._patch(batch[i], look, guess, half)
             if patch is not None:
                 seen.append((patch, guess))
-        self.back, self.sight = before, sight
-        return find_shadow(seen, look)
+        self.back, self.sight, self.shadow = before, sight, shadow
+        return find_shadow(seen, look) if about is None else find_shadow_near(seen, look, about)
 
     def _sightings(self, batch: list[Frame], points: dict[int, tuple[float, float]]) -> Sightings:
         numbers = list(points)

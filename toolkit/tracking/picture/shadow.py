@@ -17,6 +17,9 @@ _CLEAR = 8.0  # grey levels: what the model leaves counts less where it is more
 _ALIKE = 1.1  # so much worse a model may be, and as likely
 _OWN = 6.0  # grey levels: what is explained less well may be the bob
 _SHADOWY_PX = 1.2  # a sharper edge is no shadow's
+_MOVES, _STRIDE_PX = 4, 2.0  # so often each patch is moved, by so much at most
+# of the values of `_model`
+_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3])
 _DARK = 0.04  # share of light that is missed beside the bob wherever a shadow is looked for
 
 
@@ -77,31 +80,75 @@ class Shaded(NamedTuple):
 def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
     """The shadow beside the bob, by what is fitted to patches on which the bob is slow (each with the guess at its centre).
     None where the bob alone explains them nearly as well."""
-    u, v, image, back, beside = _pixels(seen, look)
+    u, v, image, back, beside, which = _pixels(seen, look)
     unlike = look.noise > 0.02 * abs(look.contrast) + 2.5  # a shadow that overlaps the bob is fitted as a part of it
     if u.size < 200 or not (unlike or _light_is_missed(u, v, image, back, beside, look)):
         return None
-    found = _beside_even(u, v, image, back, look)
+    found = _beside_even(u, v, image, back, which, look)
     return found or (_beside_patterned(u, v, image, back, look) if look.even else None)
 
 
-def _beside_even(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, look: Look) -> Shaded | None:
+def find_shadow_near(seen: list[tuple[Patch, Guess]], look: Look, about: Shaded) -> Shaded | None:
+    """The shadow found before from places that it had drawn aside, and the bob; from patches at better places."""
+    u, v, image, back, *_ = _pixels(seen, look)
+    shadow = about.shadow
+    bob = about.radius_px, about.edge_px, np.median(back) + about.contrast
+    start = np.array(
+        [0, 0, *bob, 0, 0, 1.0, shadow.right_px, shadow.down_px, shadow.strength, shadow.radius_px, shadow.soft_px]
+    )
+    values, _ = _fit(u, v, image, back, start, range(start.size), 15)
+    return _read(values, look, back)
+
+
+def _fit(
+    u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, start: np.ndarray, free: range, turns: int
+) -> tuple[np.ndarray, float]:
+    """The model's values from about `start` on, and what they leave of a pixel (squared, tamed)."""
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        return _CLEAR * np.arcsinh((image - _model(values, u, v, back)) / _CLEAR)
+
+    least = least_squares(rest, start, _STEPS, free, turns=turns)
+    return (start, np.inf) if least is None else (least.values, least.chi2 / least.rest.size)
+
+
+def _fit_in_place(
+    u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, which: np.ndarray, start: np.ndarray, free: int
+) -> tuple[np.ndarray, float]:
+    """`_fit` to patches each of which is moved to where the model explains it best: the shadow draws each guess another way, for
+    the string hides another part of both. `which` is each pixel's patch."""
+    values, left = start, np.inf
+    for _ in range(_MOVES):
+        off = image - _model(values, u, v, back)
+        weight = 1 / (1 + (off / _CLEAR) ** 2)
+        moved = (
+            _model(values, u + a, v + b, back) - _model(values, u - a, v - b, back) for a, b in ((0.5, 0), (0, 0.5))
+        )
+        by_x, by_y = moved
+        xx, xy, yy, x, y = (
+            np.bincount(which, weight * one * other)
+            for one, other in ((by_x, by_x), (by_x, by_y), (by_y, by_y), (by_x, off), (by_y, off))
+        )
+        far = np.stack([yy * x - xy * y, xx * y - xy * x]) / np.maximum(xx * yy - xy * xy, 1e-9)
+        far = np.clip(far, -_STRIDE_PX, _STRIDE_PX)
+        right, down = far - far.mean(axis=1, keepdims=True)
+        u, v = u + right[which], v + down[which]
+        values, left = _fit(u, v, image, back, values, range(free), 5)
+    return values, left
+
+
+def _beside_even(
+    u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, which: np.ndarray, look: Look
+) -> Shaded | None:
     """By a disc and a soft darker disc behind it."""
     contrast = look.contrast or float(np.median(image) - np.median(back))
     size = look.radius_px
     alone = np.array([0, 0, size, look.edge_px, np.median(back) + contrast, 0, 0, 1.0, 0, size, 0, size, 3.0])
-    steps = np.array([1e-3, 1e-3, 1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3])
 
     def fit(start: np.ndarray, free: range, every: int, turns: int) -> tuple[np.ndarray, float]:
-        some = slice(None, None, every)
+        return _fit(u[::every], v[::every], image[::every], back[::every], start, free, turns)
 
-        def rest(values: np.ndarray) -> np.ndarray:
-            return _CLEAR * np.arcsinh((image[some] - _model(values, u[some], v[some], back[some])) / _CLEAR)
-
-        least = least_squares(rest, start, steps, free, turns=turns)
-        return (start, np.inf) if least is None else (least.values, least.chi2 / least.rest.size)
-
-    _, without = fit(alone, range(8), 1, 12)
+    bare, without = fit(alone, range(8), 1, 12)
     starts = []
     for far in (0.5 * size, 1.3 * size):
         for angle in np.arange(8) * np.pi / 4:
@@ -119,9 +166,17 @@ def _beside_even(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarr
     if abs(values[12]) < abs(values[3]):  # the bob has the sharper edge: they may have been taken for each other
         other = fit(_exchanged(values), range(13), 1, 15)
         tries.insert(0 if other[1] < _ALIKE * with_it else 1, other)
-    most = (0.75 if look.even else 0.7) * without
-    found = (_read(values, look, back) for values, with_it in tries if with_it <= most)
-    return next((shaded for shaded in found if shaded is not None), None)
+    less = 0.75 if look.even else 0.7
+
+    def told(tries: list[tuple[np.ndarray, float]], without: float) -> Shaded | None:
+        read = (_read(values, look, back) for values, with_it in tries if with_it <= less * without)
+        return next((shaded for shaded in read if shaded is not None), None)
+
+    found = told(tries, without)
+    if found is not None:
+        return found
+    pixels = u, v, image, back, which
+    return told([_fit_in_place(*pixels, values, 13) for values, _ in tries], _fit_in_place(*pixels, bare, 8)[1])
 
 
 def _read(values: np.ndarray, look: Look, back: np.ndarray) -> Shaded | None:
@@ -130,10 +185,11 @@ def _read(values: np.ndarray, look: Look, back: np.ndarray) -> Shaded | None:
     shadow = Shadow(right, down, shadow_px, abs(soft), strength)
     far = float(np.hypot(right, down))
     least = 0.25 if look.even else 0.5  # a pattern may look a little like a shadow behind most of the bob
+    both = 0.5 * (radius + far + shadow_px)  # the circle about them, if they were taken for one
     plausible = (
         0.03 < strength < 0.95
         and 0.6 < shadow_px / radius < 1.6
-        and 0.6 < radius / look.radius_px < 1.3
+        and 1 / 1.3 < look.radius_px / radius < max(1 / 0.6, both / radius)
         and shadow.soft_px > max(0.3, 0.6 * abs(edge))
         and radius + 1 < far + shadow_px < 6 * radius
         and far > least * radius
@@ -188,7 +244,7 @@ def _beside_patterned(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.
 
 def _pixels(
     seen: list[tuple[Patch, Guess]], look: Look
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Some pixels of the patches but for the string: places relative to the guess, picture in the background's light, background,
     and whether that was seen there."""
     bare = []
@@ -200,15 +256,19 @@ def _pixels(
         along, across = u * ux + v * uy, np.abs(u * uy - v * ux)
         bare.append(np.argwhere((along < 0.5 * look.radius_px) | (across > 5 + 0.1 * look.radius_px)))
     every = max(1, sum(len(places) for places in bare) // _PIXELS)
-    taken, passed = [np.empty((5, 0))], 0
-    for (patch, guess), places in zip(seen, bare):
+    taken, passed = [np.empty((6, 0))], 0
+    for k, ((patch, guess), places) in enumerate(zip(seen, bare)):
         rows, columns = places[-passed % every :: every].T
         passed += len(places)
         u, v = columns + patch.x_px - guess.x_px, rows + patch.y_px - guess.y_px
         evened = patch.image * (rim_level(patch.back) / max(rim_level(patch.image), 1.0))
-        taken.append(np.array([u, v, *(picture[rows, columns] for picture in (evened, patch.back, patch.seen))]))
-    u, v, image, back, times = np.concatenate(taken, axis=1)
-    return u, v, image, back, times > 0
+        taken.append(
+            np.array(
+                [u, v, *(picture[rows, columns] for picture in (evened, patch.back, patch.seen)), np.full(u.size, k)]
+            )
+        )
+    u, v, image, back, times, which = np.concatenate(taken, axis=1)
+    return u, v, image, back, times > 0, which.astype(int)
 
 
 def _rest_beside(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, size: float) -> tuple[float, float]:
