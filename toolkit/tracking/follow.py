@@ -31,6 +31,8 @@ _STEADY = 24  # frames over which a bold pattern draws the bob to one side about
 _TELLS = 0.65  # of the bob, or of what is beside it: less than this told from what is behind it shows no bob
 _ODD = 1.3  # times the ordinary misfit: with more, something may pass behind the bob
 _BETTER = 0.75  # times that misfit: where less is left, it did
+_DIM = 0.1  # of the light: by so much another light than lately on the wall is none, but something that passes
+_FACES = 0.5  # of what is about the bob: so much must be told from it, that its outline says where it is
 _UNSTEADY_PX = 0.3  # so far places stray from a swing before a camera that a hand holds
 
 
@@ -75,6 +77,7 @@ class Follower(Known):
         # how much of a bob with a pattern differs from what stands still: at the place judged last, and lately
         self._unlike_seen = self._usually_unlike = np.nan
         self._speed = 0.0  # of the bob on it, px/s
+        self._light = nan  # on the wall behind the bob lately, against that when the background was learned
         self._lit: tuple[float, Frame | None] = (nan, None)  # the bob's brightness lately, and on which picture
         self._string: StringLine | None = None  # as it was measured last
         # no background shows how the camera moves, and the bob strays: then the string is measured on every frame
@@ -129,9 +132,10 @@ class Follower(Known):
         patch = self._patch(frame, self.look, guess)
         place = NOWHERE if patch is None else self._locate(patch, guess)
         believed = patch is not None and self._believe(place, guess)
-        if patch is not None and self.look.even and (not believed or place.misfit > _ODD * self.ordinary_misfit):
-            other = self._before_passer(patch, place if believed else guess, guess)
-            if other is not None and not (believed and other[0].misfit > _BETTER * place.misfit):
+        dim = abs(place.light - self._light) > _DIM * self._light
+        if patch is not None and self.look.even and (not believed or dim or place.misfit > _ODD * self.ordinary_misfit):
+            other = self._before_passer(patch, place if believed and not dim else guess, guess)
+            if other is not None and not (believed and other[0].misfit > (1.0 if dim else _BETTER) * place.misfit):
                 (place, patch), believed = other, True
         if patch is None or not believed:
             found = self._look_around(frame, guess)
@@ -155,7 +159,7 @@ class Follower(Known):
             about = place = self._locate(there, near)
             # what is of the bob's brightness may as well pass before it
             told = np.abs(there.back - place.contrast - place.wall) > 4 * place.misfit
-            if not self._believe(place, guess) or np.mean(told) < _TELLS:
+            if not self._believe(place, guess) or np.mean(told) < _FACES or abs(place.light - 1) > _DIM:
                 return None
             found = place, there
         return found
@@ -328,6 +332,7 @@ class Follower(Known):
         if isnan(place.wall) or not self.look.even:
             return
         shade = self._shade_seen
+        self._light = place.light if isnan(self._light) else self._light + 0.1 * (place.light - self._light)
         if self._picture is not None:
             self._lit = (place.contrast + place.wall, self._picture)
         if isnan(self._shade):
