@@ -18,6 +18,7 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.begin.acquire import REMEDY, find_bob
+from toolkit.tracking.clip.bars import ErrorBars
 from toolkit.tracking.clip.clock import (
     even_times,
     late_told,
@@ -32,7 +33,6 @@ from toolkit.tracking.clip.held import held_swing
 from toolkit.tracking.clip.joint import Camera, fit_jointly
 from toolkit.tracking.clip.outline import pulled_by_string
 from toolkit.tracking.clip.places import Places
-from toolkit.tracking.clip.scatter import Factors
 from toolkit.tracking.clip.shake import Shake
 from toolkit.tracking.clip.verdict import poor_motion, poor_picture, require_pendulum
 from toolkit.tracking.follow import Follower, Record
@@ -274,18 +274,18 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     if not np.array_equal(left.good, good):
         places, good = left, left.good
         joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
-    log += shake.told(joint.factors.shake_px)
+    log += shake.told(joint.bars.shake_px)
     late_told(places, untimely, log, warnings)
     log += strays_told(places, stray)
 
     rx, ry = ((p - m)[good] for p, m in ((places.x_px, joint.x_px), (places.y_px, joint.y_px)))
     rms_px = float(np.sqrt(0.5 * np.mean(rx**2 + ry**2)))
-    sx, sy = places.sigma_x_px * joint.factors.x, places.sigma_y_px * joint.factors.y
+    sx, sy = joint.bars.sigma_x_px, joint.bars.sigma_y_px
     late = time_sigma * np.hypot(*swing.velocity(places.t_s))
-    borne = joint.factors.shake_px if shake.by_string else 0.0  # it strays so far, and the angles' σ allows for it
+    borne = joint.bars.shake_px if shake.by_string else 0.0  # it strays so far, and the angles' σ allows for it
     typical = float(np.sqrt(np.mean((0.5 * (sx**2 + sy**2 + late**2) + shake.sigma**2 + borne**2)[good])))
     motion = swing if joint.view is None else joint.view.swing(fps_factor)
-    if not joint.factors.shake_px:  # a shaking camera leaps too
+    if not joint.bars.shake_px:  # a shaking camera leaps too
         warnings += slips_told(places, swing, joint.x_px, joint.y_px)
     warnings += poor_motion(motion, places.t_s, good, rms_px, typical, look.radius_px, shake.by_string)
     warnings += poor_picture(misfit, look.even, off_px, rms_px)
@@ -298,7 +298,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     steps = np.diff(places.t_s)
     if follower.choice:
         log.append(follower.choice)
-    log += _how_followed(follower, good, bridged, joint.factors, fps_factor)
+    log += _how_followed(follower, good, bridged, joint.bars, fps_factor)
     return Track(
         frame=np.array(record.index),
         t_s=places.t_s / fps_factor,
@@ -330,7 +330,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             "pivot_given": pivot is not None,
             "shift_x_px": shake.x,
             "shift_y_px": shake.y,
-            "shift_sigma_px": np.hypot(shake.sigma, joint.factors.shake_px),
+            "shift_sigma_px": np.hypot(shake.sigma, joint.bars.shake_px),
             "time_sigma_s": time_sigma / fps_factor,
             "string_x_px": strings.x_px,
             "string_y_px": strings.y_px,
@@ -345,7 +345,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
 
 
 def _how_followed(
-    follower: Follower, good: np.ndarray, bridged: np.ndarray, factors: Factors, fps_factor: float
+    follower: Follower, good: np.ndarray, bridged: np.ndarray, bars: ErrorBars, fps_factor: float
 ) -> list[str]:
     """Sentences on how the bob was followed and what became of its error bars."""
     look = follower.look
@@ -367,8 +367,8 @@ def _how_followed(
         said(
             "track.error_bars",
             "The error bars of the fit were multiplied by {x:.2f} (x) and {y:.2f} (y), the scatter seen about a smooth motion.",
-            x=factors.x,
-            y=factors.y,
+            x=bars.x,
+            y=bars.y,
         ),
     ]
 

@@ -31,12 +31,13 @@ class Frame:
 
     index : counts decoded frames from 0.    t_s : its time stamp, the first decoded frame's being 0.
     luma : (height, width) uint8, often a view into the decoder's memory: read it, do not write it.
+    kind : how the codec coded it, by ffmpeg's numbers (1 I, 2 P, 3 B …), 0 where that is not known.
     """
 
-    __slots__ = ("_colour", "index", "luma", "t_s")
+    __slots__ = ("_colour", "index", "kind", "luma", "t_s")
 
-    def __init__(self, index: int, t_s: float, luma: np.ndarray, colour: Callable[[str], Any]) -> None:
-        self.index, self.t_s, self.luma, self._colour = index, t_s, luma, colour
+    def __init__(self, index: int, t_s: float, luma: np.ndarray, colour: Callable[[str], Any], kind: int = 0) -> None:
+        self.index, self.t_s, self.luma, self._colour, self.kind = index, t_s, luma, colour, kind
 
     @property
     def bgr(self) -> np.ndarray:
@@ -197,7 +198,8 @@ def _decode_pyav(path: Path, rotation: int, fps: float | None) -> Iterator[Frame
             if first is None:
                 first = stamp
             luma = _luma(picture)
-            yield Frame(index, stamp - first, np.rot90(luma, turns) if turns else luma, _colour_of(picture, turns))
+            upright = np.rot90(luma, turns) if turns else luma
+            yield Frame(index, stamp - first, upright, _colour_of(picture, turns), int(picture.pict_type))
             index += 1
 
 

@@ -45,6 +45,7 @@ class Record:
     place: list[Place] = field(default_factory=list)
     ok: list[bool] = field(default_factory=list)
     repeated: list[bool] = field(default_factory=list)
+    kind: list[int] = field(default_factory=list)  # of picture, as the codec coded it
     shift: list[CameraShift | None] = field(default_factory=list)
     string: dict[int, tuple[float, ...]] = field(default_factory=dict)
     pull: dict[int, tuple[float, float]] = field(default_factory=dict)  # by the string on the bob's place, px
@@ -102,6 +103,7 @@ class Follower(Known):
         r.ok.append(patch is not None)
         r.shift.append(shift if self.shaking else None)
         r.repeated.append(repeated)
+        r.kind.append(frame.kind)
         if patch is not None:
             self._remember(frame.t_s, place)
             if self.astray > 0.1 * self.look.radius_px + 1 and len(r.index) - self._fitted_at > 60:

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from toolkit.tracking.clip.bars import Bars, ErrorBars
 from toolkit.tracking.clip.places import Places
-from toolkit.tracking.clip.scatter import Factors, true_sigma
 from toolkit.tracking.clip.shake import Shake
 from toolkit.tracking.geometry.swing import Swing
 from toolkit.tracking.geometry.view import View
@@ -33,10 +33,10 @@ class Camera(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """The view (None where none fits), what makes σ true, and where the motion so seen has the bob, (n,) px."""
+    """The view (None where none fits), the error bars, and where the motion so seen has the bob, (n,) px."""
 
     view: View | None
-    factors: Factors
+    bars: ErrorBars
     x_px: np.ndarray
     y_px: np.ndarray
 
@@ -44,44 +44,25 @@ class Joint(NamedTuple):
 def fit_jointly(
     places: Places, swing: Swing, shake: Shake, time_sigma_s: float, lines: Lines | None, camera: Camera
 ) -> Joint:
-    """The camera's view of the motion, and the factors of σ about it."""
+    """The camera's view of the motion, and the error bars about it."""
     t, good = places.t_s, places.good
-    vx, vy = swing.velocity(t)
-    late_x, late_y = (np.hypot(v * time_sigma_s, shake.sigma) for v in (vx, vy))
-
+    velocity = np.array(swing.velocity(t))
+    late_x, late_y = np.hypot(velocity * time_sigma_s, shake.sigma)
     slow_px = (_EVEN if camera.even else _UNEVEN) * camera.off_px
-    unsteady = min(shake.unseen_px, np.inf if lines is None else lines.apart_px)
-
-    def factors(x: np.ndarray, y: np.ndarray, rough: bool = False) -> Factors:
-        rx, ry = (places.x_px - x)[good], (places.y_px - y)[good]
-        sx, sy = places.sigma_x_px[good], places.sigma_y_px[good]
-        velocity = vx[good], vy[good]
-        found = true_sigma(
-            t[good], (rx, ry), (sx, sy), velocity, shake.sigma[good], time_sigma_s, unsteady, rough, slow_px
-        )
-        if not shake.taken:
-            return found
-        # the picture's own places hold the shake, which is smooth, but not the error with which it was measured
-        picture = rx + shake.x[good], ry + shake.y[good]
-        own = true_sigma(t[good], picture, (sx, sy), velocity, 0 * shake.sigma[good], time_sigma_s, rough=True)
-        if not shake.by_string:
-            return found._replace(x=own.x, y=own.y)
-        # by the string each place is at its length from the pivot, and what strays is along the motion: the camera's roll
-        left = float(np.mean(rx**2 + ry**2)) - float(np.mean(shake.sigma[good] ** 2))
-        return Factors(own.x, own.y, float(np.sqrt(max(left, 0.0))))
-
+    unsteady_px = min(shake.unseen_px, np.inf if lines is None else lines.apart_px)
+    bars = Bars(places, shake, velocity, time_sigma_s, unsteady_px, slow_px)
     start = swing.values_at(t[good][0], camera.fps_factor)
     when = t / camera.fps_factor
     mx, my = swing.position(t)
-    joint = Joint(None, factors(mx, my, rough=True), mx, my)
+    joint = Joint(None, bars.about(mx, my, rough=True), mx, my)
     for _ in range(_VIEWS):
-        scale = joint.factors
+        scale = joint.bars
         found = fit_view(
             when[good],
             places.x_px[good],
             places.y_px[good],
-            np.sqrt((places.sigma_x_px * scale.x) ** 2 + late_x**2 + scale.shake_px**2)[good],
-            np.sqrt((places.sigma_y_px * scale.y) ** 2 + late_y**2 + scale.shake_px**2)[good],
+            np.sqrt(scale.sigma_x_px**2 + late_x**2 + scale.shake_px**2)[good],
+            np.sqrt(scale.sigma_y_px**2 + late_y**2 + scale.shake_px**2)[good],
             start,
             camera.size_px,
             lines,
@@ -93,8 +74,8 @@ def fit_jointly(
         if found is None:
             break
         seen = found.position(when, joint.x_px, joint.y_px)
-        joint = Joint(found, factors(*seen), *seen)
-        after = joint.factors
+        joint = Joint(found, bars.about(*seen), *seen)
+        after = joint.bars
         if not found.shown or min(after.x / scale.x, after.y / scale.y) > _SETTLED:
             break
     return joint

@@ -15,6 +15,7 @@ class Places:
 
     t_s : when, the first frame used at 0.    x_px, y_px, sigma_x_px, sigma_y_px : the places, and the localiser's own σ of
     them.    good : bool, on which frames they are believed.    repeated : bool, pictures that are those before them again.
+    kind : int, of picture, as the codec coded it (`Frame`); None where that is not known.
     """
 
     t_s: np.ndarray
@@ -24,12 +25,13 @@ class Places:
     sigma_y_px: np.ndarray
     good: np.ndarray
     repeated: np.ndarray
+    kind: np.ndarray | None = None
 
     @classmethod
     def of(cls, record: Record, t_s: np.ndarray) -> Places:
         """Those of a record, at times t_s (n,)."""
         x, y, sx, sy = np.array([p[:4] for p in record.place], float).T
-        return cls(t_s, x, y, sx, sy, np.array(record.ok), np.array(record.repeated))
+        return cls(t_s, x, y, sx, sy, np.array(record.ok), np.array(record.repeated), np.array(record.kind))
 
     def without(self, frames: np.ndarray) -> Places:
         """The same with these frames (n,) bool not believed, and no place or σ where none is."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
+
+from toolkit.tracking.clip.band import beyond_band
 
 _FITS = 2.5  # a motion fits where places stray from it by less than so many times their scatter from frame to frame
 _CLOCK = 3.0  # by how much a localiser may be worse along the motion than across it
@@ -20,18 +23,20 @@ _LEAST, _USUAL, _MOST = 0.2, 4.0, 10.0  # what a fit's own σ is multiplied by; 
 
 
 class Factors(NamedTuple):
-    """What the fits' own σ are to be multiplied by, and what moves all places of a frame alike (px), beyond what is known."""
+    """What the fits' own σ are to be multiplied by, what moves all places of a frame alike (px), beyond what is known, and whether
+    all that strays from the motion, but for the clock, are the localiser's errors."""
 
     x: float
     y: float
     shake_px: float
+    wholly: bool = False
 
 
 def true_sigma(
     t_s: np.ndarray,
-    residuals: tuple[np.ndarray, np.ndarray],
-    sigmas: tuple[np.ndarray, np.ndarray],
-    velocity: tuple[np.ndarray, np.ndarray],
+    residuals: Iterable[np.ndarray],
+    sigmas: Iterable[np.ndarray],
+    velocity: Iterable[np.ndarray],
     shake_px: np.ndarray,
     time_sigma_s: float,
     unsteady_px: float = np.inf,
@@ -61,7 +66,7 @@ def true_sigma(
     found, fits, wholly = [], [], []
     all_s = np.array([sx, sy, across[1]])
     # a few pictures may be of another time
-    all_r = np.array([_tamed(r / s) * s for r, s in zip((rx, ry, across[0]), all_s)])
+    all_r = np.array([tamed(r / s) * s for r, s in zip((rx, ry, across[0]), all_s)])
     ways = float(np.mean(ux**2)), float(np.mean(uy**2)), 0.0
     for r, s, late, scatter, way in zip(all_r, all_s, clock, quick_scatter(t_s, all_r, all_s), ways):
         known = float(np.mean((np.hypot(late, shake_px) / s) ** 2))
@@ -74,19 +79,53 @@ def true_sigma(
             found.append(float(np.fmax(quick, whole)))
         else:
             found.append(_CARRIED**2 * quick if quick < _MOST**2 else np.nan)
+    count, beside_clock = r.size / _COUNT, bool(time_sigma_s and wholly[2])
+    if not (rough or beside_clock or (wholly[0] and wholly[1])):
+        count, quick_squares = _beyond(t_s, np.array([rx, ry]), all_s[:2], np.hypot(clock[:2], shake_px))
+        found[:2] = [f if all_of_it else q for f, q, all_of_it in zip(found, quick_squares, wholly)]
     own = found[2] if np.isfinite(found[2]) else _USUAL**2
     # the rest is the clock's
     x, y = (f if f <= _CLOCK**2 * own or (slow and all_of_it) else own for f, all_of_it in zip(found[:2], wholly))
     more = _MORE * (ways[0] - ways[1])
-    if time_sigma_s and wholly[2]:
+    if beside_clock:
         x, y = _beside_clock(all_r[:2], all_s[:2], np.array(clock[:2]), own, more)
     elif not (wholly[0] or wholly[1]):
-        x, y = _alike(x, y, rx.size / _COUNT, more)
+        x, y = _alike(x, y, count, more)
     left = 0.0
     if not (rough or fits[2] or still):
         r, s = across
         left = float(np.sqrt(max(np.mean(r**2) - own * np.mean(s**2) - np.mean(shake_px**2), 0.0)))
-    return Factors(max(float(np.sqrt(x)), _LEAST), max(float(np.sqrt(y)), _LEAST), left)
+    return Factors(
+        max(float(np.sqrt(x)), _LEAST), max(float(np.sqrt(y)), _LEAST), left, beside_clock or (wholly[0] and wholly[1])
+    )
+
+
+def quick_sigma(
+    t_s: np.ndarray, r: np.ndarray, s: np.ndarray, velocity: np.ndarray, time_sigma_s: float
+) -> tuple[float, float]:
+    """The factors of both axes as far as what changes from frame to frame tells them, for residuals r of the localiser's σ s, all (2, n),
+    beside whatever is slow, and a clock."""
+    count, (x, y) = _beyond(t_s, r, s, velocity * time_sigma_s)
+    ways = np.mean(velocity**2, axis=1) / np.mean(np.sum(velocity**2, axis=0))
+    more = _MORE * float(ways[0] - ways[1])
+    if np.isfinite(x) and np.isfinite(y):
+        x, y = _alike(x, y, count, more)
+    elif not np.isfinite(y):
+        x, y = (x, x * np.exp(-2 * more)) if np.isfinite(x) else (_USUAL**2, _USUAL**2)
+    else:
+        x = y * np.exp(2 * more)
+    return max(float(np.sqrt(x)), _LEAST), max(float(np.sqrt(y)), _LEAST)
+
+
+def _beyond(t_s: np.ndarray, r: np.ndarray, s: np.ndarray, known: np.ndarray) -> tuple[float, list[float]]:
+    """How many independent values tell of what is quicker than whatever is slow in residuals r of the localiser's σ s beside errors `known`,
+    all (2, n), and the squares of the factors that make it the localiser's; NaN where that cannot be told."""
+    unit = np.sqrt(s[0] * s[1])
+    beyond = beyond_band(t_s, r, unit)
+    squares = np.sum(beyond.rest**2, axis=1)
+    told = np.array([_less(a, b) for a, b in zip(squares, beyond.holds((known / unit) ** 2))])
+    told *= _CARRIED**2 / beyond.holds((s / unit) ** 2)
+    return float(beyond.left), [f if f < _MOST**2 else np.nan for f in told.tolist()]
 
 
 def _less(square: float, known: float) -> float:
@@ -139,7 +178,7 @@ def _left(r: np.ndarray, step_rad: float, values: float) -> float:
     return max(1 - taken * alike, min(_LEFT, 1 - taken), 1 / r.size)
 
 
-def _tamed(r: np.ndarray) -> np.ndarray:
+def tamed(r: np.ndarray) -> np.ndarray:
     """The series with its strays drawn in to five of its robust standard deviation."""
     most = 5 * 1.4826 * float(np.median(np.abs(r - np.median(r))))
     return np.clip(r, np.median(r) - most, np.median(r) + most)
