@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
+from toolkit import Scene, render, track
+from toolkit.render import stage
 from toolkit.trackers.localiser import Guess, Look, Patch
 from toolkit.tracking.begin.bold import learn_bold
 from toolkit.tracking.geometry.swing import fit_swing, start_swing
@@ -23,26 +26,76 @@ def striped_ball(cx, cy, turn, size=64, over=6):
     return WALL + (DARK - WALL) * dark.reshape(size, over, size, over).mean(axis=(1, 3))
 
 
-@pytest.mark.parametrize("guessed", [0.9, 1.12])
-def test_the_size_of_a_bob_is_learned_though_half_of_its_outline_is_the_walls(guessed):
+def filmed(rng, t, x, y, turn, soft_px=0.0, exposure_s=0.0, noise=1.5, step_s=1e-4):
+    """Pictures 64×64 of it at times t, the lens of this blur (normal, px), and where their first pixels lie."""
+    x0, y0 = np.floor(x).astype(int) - 32, np.floor(y).astype(int) - 32
+    parts = np.linspace(-0.5, 0.5, 9) * exposure_s if exposure_s else [0.0]
+    vx, vy = np.gradient(x, t), np.gradient(y, t)
+    images = []
+    for k in range(t.size):
+        shots = [striped_ball(x[k] + u * vx[k] - x0[k], y[k] + u * vy[k] - y0[k], turn[k]) for u in parts]
+        image = np.mean(shots, axis=0)
+        image = gaussian_filter(image, soft_px) if soft_px else image
+        images.append((image + rng.normal(0, noise, image.shape)).astype(np.float32))
+    return images, x0, y0
+
+
+def learned(guessed, pull_px, **how):
+    """What is learned of it swinging, at 30 pictures a second, if it is found beside its place, towards where it is dark."""
     rng = np.random.default_rng(5)
     t = np.arange(48) / 30
     theta = 0.2 * np.cos(5 * t)
     x, y, turn = 300 + 300 * np.sin(theta), -100 + 300 * np.cos(theta), 2.4 * t
-    x0, y0 = np.floor(x).astype(int) - 32, np.floor(y).astype(int) - 32
-    images = [striped_ball(a - b, c - d, w) for a, b, c, d, w in zip(x, x0, y, y0, turn)]
-    images = [(i + rng.normal(0, 1.5, i.shape)).astype(np.float32) for i in images]
+    images, x0, y0 = filmed(rng, t, x, y, turn, **how)
     wall = np.full((64, 64), WALL, np.float32)
+    vx, vy = np.gradient(x, t), np.gradient(y, t)
 
     def show(k, look, centre, streak_s):
-        return Guess(*centre), Patch(images[k], wall, np.full_like(wall, 20.0), x0[k], y0[k])
+        guess = Guess(*centre, vx[k] * streak_s, vy[k] * streak_s)
+        return guess, Patch(images[k], wall, np.full_like(wall, 20.0), x0[k], y0[k])
 
-    pulled = x + 2.5 * np.sin(3 * turn)  # towards where it is dark
+    pulled = x + pull_px * np.sin(3 * turn)
     swing = fit_swing(t, pulled, y, np.full(t.size, 0.3), start_swing(t, pulled, y))
-    seen = Sightings(pulled, y, np.gradient(x, t), np.gradient(y, t), show)
-    found = learn_bold(seen, t, Look(guessed * RADIUS, 1.0, -20.0), swing, None)
-    assert found.look.radius_px == pytest.approx(RADIUS, rel=0.03)
-    assert found.look.contrast == pytest.approx(DARK - WALL, rel=0.15)
+    seen = Sightings(pulled, y, vx, vy, show)
+    return learn_bold(seen, t, Look(guessed * RADIUS, 1.0, -20.0), swing, None, 1 / 30), t, x
+
+
+@pytest.mark.parametrize(("guessed", "soft_px"), [(0.9, 0.6), (1.12, 0.6), (0.9, 1.2), (1.12, 1.2), (0.9, 2.2)])
+def test_size_and_edge_of_a_bob_are_learned_though_half_of_its_outline_is_the_walls(guessed, soft_px):
+    found, t, x = learned(guessed, 2.5, soft_px=soft_px)
+    assert found.looks.look.radius_px == pytest.approx(RADIUS, rel=0.03)
+    assert found.looks.look.edge_px == pytest.approx(np.hypot(soft_px, 1 / np.sqrt(12)), rel=0.2)
+    assert found.looks.look.contrast == pytest.approx(DARK - WALL, rel=0.15)
+    assert 300 * found.looks.exposure_s < 1.5 * soft_px + 0.5  # px, about: so short a streak hardly adds to the edge
     assert found.calm
-    where = found.swing.position(t)
-    assert np.std(where[0] - x) < 0.5 * np.std(pulled - x)
+    assert np.std(found.swing.position(t)[0] - x) < 0.5 * np.std(2.5 * np.sin(7.2 * t))
+
+
+def test_its_exposure_is_learned_too():
+    found, _, _ = learned(1.05, 0.5, soft_px=0.6, exposure_s=0.5 / 30)
+    assert found.looks.exposure_s == pytest.approx(0.5 / 30, abs=0.15 / 30)
+    assert found.looks.look.radius_px == pytest.approx(RADIUS, rel=0.03)
+
+
+def test_a_stripe_as_bright_as_the_wall_draws_the_place_to_no_side(tmp_path):
+    scene = Scene.from_dict(
+        {
+            "pendulum": {"mass_kg": 0.1, "length_m": 0.4, "bob_radius_m": 0.045},
+            "release": {"theta0_rad": 0.15},
+            "camera": {
+                "width_px": 320, "height_px": 240, "fps": 30, "duration_s": 3.0, "px_per_m": 400, "pivot_px": [160.3, 20.4],
+                "seed": 5, "sensor_noise": {"read_sigma": 1.5}, "codec": {"name": "lossless"},
+                "wall": {"colour_rgb": [202.0, 197.0, 222.0]},
+                "bob_look": {
+                    "look": "rotating_pattern", "colour_rgb": [44.0, 52.0, 56.0], "strength": 0.79, "spin_rad_per_s": -2.7,
+                },
+            },
+        }
+    )  # fmt: skip
+    film = tmp_path / "film.mkv"
+    render(scene, film)
+    truth, found = stage(scene).truth, track(film)
+    assert found.localiser == "edge"
+    assert found.ok.mean() > 0.95
+    for at, true in ((found.x_px, truth.x_px), (found.y_px, truth.y_px)):
+        assert np.sqrt(np.mean((at - true[found.frame])[found.ok] ** 2)) < 0.5

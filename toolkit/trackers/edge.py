@@ -49,47 +49,42 @@ _RADIUS = 0.3  # px, of the radius about the look's
 def locate(patch: Patch, look: Look, guess: Guess) -> Place:
     """The centre of the likeliest outline; the radius may differ a little from the look's."""
     fit = fit_outline(patch, look, guess)
-    return NOWHERE if fit is None else fit[0]
+    return NOWHERE if fit is None else fit.place
 
 
-def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] | None:
-    """The place and the radius in px; None where too little of an outline is seen."""
-    import cv2
+class Outline(NamedTuple):
+    """Where the outline was found, and its radius (px) with that one's variance."""
 
+    place: Place
+    radius_px: float
+    variance_px2: float
+
+
+def fit_outline(patch: Patch, look: Look, guess: Guess, spread_px: float = _RADIUS) -> Outline | None:
+    """The likeliest outline of a radius within about `spread_px` of the look's; None where too little of one is seen."""
     contrast = look.contrast or float(np.ptp(patch.image - patch.back))
     if not abs(contrast) > 0:
         return None
+    rays = _rays(patch, look._replace(contrast=contrast), guess)
     rows, columns = patch.image.shape
     centre = np.array([guess.x_px - patch.x_px, guess.y_px - patch.y_px], float)
-    picture = np.ascontiguousarray((patch.image - patch.back) / contrast, np.float32)
-    some = picture[::2, ::2]
-    quiet = 1.4826 * float(np.median(np.abs(some - np.median(some))))
-    noise = float(2.0 ** np.round(np.log2(np.clip(quiet, _FLOOR, 0.2))))
-    count = int(max(32, 2 * np.pi * look.radius_px / 0.9))
-    angles = (np.arange(count) + 0.5) * 2 * np.pi / count
-    if np.isfinite(guess.string_rad):
-        half, turn = min(0.9, 0.2 + 3.0 / look.radius_px), np.pi if guess.faces else 2 * np.pi
-        angles = angles[np.abs((angles - guess.string_rad + turn / 2) % turn - turn / 2) > half]
-    ux, uy = np.cos(angles), np.sin(angles)
-    streak = np.abs(guess.streak_x_px * ux + guess.streak_y_px * uy)
     wide = max(1.0, look.radius_px / 6)
     unit = 1.0
     for turn in range(6):
         edge = float(round(max(look.edge_px / unit, 0.3), 1))
-        blurs = _BLURS[np.searchsorted(_BETWEEN, streak / unit)]
-        r = _grid(edge, int(blurs.max()))
-        far = (look.radius_px + unit * r).astype(np.float32)
-        x, y = (np.float32(c) + u.astype(np.float32)[:, None] * far for c, u in zip(centre, (ux, uy)))
+        blurs = _BLURS[np.searchsorted(_BETWEEN, rays.streak / unit)]
+        r = _grid(_reach(edge, int(blurs.max())))
+        x, y = rays.along(centre, look.radius_px + unit * r)
         last = int(np.searchsorted(r, 2.5 * edge + 0.5)) - 1  # the picture is convex: with it, it has those before
         inside = (x[:, last] >= 0) & (x[:, last] <= columns - 1) & (y[:, last] >= 0) & (y[:, last] <= rows - 1)
         if inside.sum() < 12:
             return None
-        profile = cv2.remap(picture, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        levels = _seen_on(picture, centre, look.radius_px - 2.5 * unit)
-        cost, least = _weigh(profile, r, edge, blurs, noise, levels, inside)
+        profile = rays.seen(x, y)
+        levels = _seen_on(rays.picture, centre, look.radius_px - 2.5 * unit)
+        cost, least = _weigh(profile, r, edge, blurs, rays.noise, levels, inside)
         scale = max(1.0, float(np.median(least[inside])) / r.size)
         cost /= scale
-        found, variance, apart = _likeliest(cost, ux, uy, inside)
+        found, variance, apart = _likeliest(cost, rays.ux, rays.uy, inside, spread_px)
         step = unit * float(np.hypot(found[0], found[1]))
         centre += unit * np.clip(found[:2], -1.5, 1.5)
         if unit == 1 and step < _SETTLED:
@@ -104,15 +99,73 @@ def fit_outline(patch: Patch, look: Look, guess: Guess) -> tuple[Place, float] |
         return None  # so soft an edge that the rays begin within it: they do not tell the bob from what is beyond
     within = profile[:, deep].mean(axis=1)
     beyond = profile[:, -3:].mean(axis=1)
-    seen = inside & (apart < 2 * _FAR) & (np.abs(within - beyond) > max(0.12, 3 * noise))
+    seen = inside & (apart < 2 * _FAR) & (np.abs(within - beyond) > max(0.12, 3 * rays.noise))
     if seen.sum() < 10:
         return None
     place = Place(
         float(centre[0]) + patch.x_px, float(centre[1]) + patch.y_px, max(float(sigma[0]), 1e-4), max(float(sigma[1]), 1e-4),
-        abs(contrast) * noise * float(np.sqrt(scale)), float(seen.mean()),
+        abs(contrast) * rays.noise * float(np.sqrt(scale)), float(seen.mean()),
         float(np.median((within - beyond)[seen])) * contrast,
     )  # fmt: skip
-    return place, look.radius_px + float(found[2])
+    return Outline(place, look.radius_px + float(found[2]), float(variance[2]))
+
+
+def unlikely(patch: Patch, look: Look, guess: Guess, reach_px: float, shells: bool = True) -> float:
+    """Minus twice the log-likelihood of an ordinary ray, the bob having this look and streak and its outline being about where it is
+    guessed: of two looks the one with less is the likelier, if the rays reach as far (px beyond the outline) for both. Streaks are
+    compared without `shells`, which are not told through long ones."""
+    rays = _rays(patch, look, guess)
+    rows, columns = patch.image.shape
+    centre = np.array([guess.x_px - patch.x_px, guess.y_px - patch.y_px], float)
+    edge = float(round(max(look.edge_px, 0.3), 1))
+    blurs = _BLURS[np.searchsorted(_BETWEEN, rays.streak)]
+    r = _grid(reach_px)
+    x, y = rays.along(centre, look.radius_px + r)
+    inside = (x.min(axis=1) >= 0) & (x.max(axis=1) <= columns - 1) & (y.min(axis=1) >= 0) & (y.max(axis=1) <= rows - 1)
+    if inside.sum() < 12:
+        return np.nan
+    levels = _seen_on(rays.picture, centre, look.radius_px - 2.5)
+    _, least = _weigh(rays.seen(x, y), r, edge, blurs, rays.noise, levels, inside, reach_px, shells)
+    lowest = np.array([_model(edge, int(blur), rays.noise, reach_px, shells).lowest for blur in blurs])
+    return float(np.median((least + lowest)[inside]))
+
+
+class _Rays(NamedTuple):
+    """Rays from the bob's centre, (n,): their directions' cosines and sines, and how far (px) the exposure blurs each; before the
+    picture less the background, in units of the contrast, and its noise."""
+
+    picture: np.ndarray
+    noise: float
+    ux: np.ndarray
+    uy: np.ndarray
+    streak: np.ndarray
+
+    def along(self, centre: np.ndarray, far_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """x and y, (n, k) float32, of the points so far (k,) from the centre."""
+        far = far_px.astype(np.float32)
+        x, y = (np.float32(c) + u.astype(np.float32)[:, None] * far for c, u in zip(centre, (self.ux, self.uy)))
+        return x, y
+
+    def seen(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """The picture at these points, as many."""
+        import cv2
+
+        return np.asarray(cv2.remap(self.picture, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))
+
+
+def _rays(patch: Patch, look: Look, guess: Guess) -> _Rays:
+    """A ray a pixel of the outline, but for those on which the string is expected."""
+    picture = np.ascontiguousarray((patch.image - patch.back) / look.contrast, np.float32)
+    some = picture[::2, ::2]
+    quiet = 1.4826 * float(np.median(np.abs(some - np.median(some))))
+    noise = float(2.0 ** np.round(np.log2(np.clip(quiet, _FLOOR, 0.2))))
+    count = int(max(32, 2 * np.pi * look.radius_px / 0.9))
+    angles = (np.arange(count) + 0.5) * 2 * np.pi / count
+    if np.isfinite(guess.string_rad):
+        half, turn = min(0.9, 0.2 + 3.0 / look.radius_px), np.pi if guess.faces else 2 * np.pi
+        angles = angles[np.abs((angles - guess.string_rad + turn / 2) % turn - turn / 2) > half]
+    ux, uy = np.cos(angles), np.sin(angles)
+    return _Rays(picture, noise, ux, uy, np.abs(guess.streak_x_px * ux + guess.streak_y_px * uy))
 
 
 def _seen_on(picture: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
@@ -125,33 +178,38 @@ def _seen_on(picture: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarr
     return np.partition(on, ranks)[ranks]
 
 
-def _grid(edge: float, blur: int) -> np.ndarray:
-    """Where rays are sampled, px beyond the outline."""
-    reach = 2.2 * edge + 0.5 * blur
+def _reach(edge: float, blur: int) -> float:
+    """How far beyond the outline (px) it is to be seen."""
+    return 2.2 * edge + 0.5 * blur
+
+
+def _grid(reach: float) -> np.ndarray:
+    """Where rays are sampled, px beyond the outline, which is to be seen so far."""
     return np.arange(np.floor((-_DEEP - min(reach, 3.0)) / _STEP), np.ceil((reach + 2.0) / _STEP) + 1) * _STEP
 
 
 class _Model(NamedTuple):
     """For each place of the outline and each shell (none first), (m, …): what makes profiles white noise, what a level of 1
-    within the shell and of 1 in it become by that, and the volume's logarithm."""
+    within the shell and of 1 in it become by that, and the volume's logarithm, above the `lowest`."""
 
     whiten: np.ndarray
     within: np.ndarray
     shell: np.ndarray
     volume: np.ndarray
+    lowest: float  # of it, which is left out
     addresses: tuple[int, ...]  # of these
     first_px: float  # the first sample, beyond the outline
 
 
 @lru_cache(maxsize=256)
-def _model(edge: float, blur: int, noise: float) -> _Model:
+def _model(edge: float, blur: int, noise: float, reach: float, shells: bool) -> _Model:
     from scipy.special import ndtr
 
     from toolkit.motion.compiled import address
 
-    r = _grid(edge, blur)
+    r = _grid(reach)
     ends = np.linspace(-0.5, 0.5, 1 + 2 * blur) * blur
-    depths, change = (_SHELLS, _CHANGE) if blur <= _SEEN_THROUGH else (_SHELLS[:0], _CHANGE_BLURRED)
+    depths, change = (_SHELLS, _CHANGE) if shells and blur <= _SEEN_THROUGH else (_SHELLS[:0], _CHANGE_BLURRED)
 
     def covered(rims: np.ndarray, sigma: float) -> np.ndarray:
         return np.asarray(ndtr((rims[..., None, None] + ends - r[:, None]) / sigma).mean(axis=-1))
@@ -171,7 +229,7 @@ def _model(edge: float, blur: int, noise: float) -> _Model:
     volume = 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
     parts = (whiten, (whiten @ within[..., None])[..., 0], (whiten @ shell[..., None])[..., 0], volume - volume.min())
     a, b, c, d = (np.where(np.abs(p) < 1e-9, 0, p).astype(np.float32) for p in parts)  # denormal numbers are slow
-    return _Model(a, b, c, d, tuple(address(p) for p in (a, b, c, d)), float(r[0]))
+    return _Model(a, b, c, d, float(volume.min()), tuple(address(p) for p in (a, b, c, d)), float(r[0]))
 
 
 def _weigh(
@@ -182,9 +240,11 @@ def _weigh(
     noise: float,
     levels: np.ndarray,
     inside: np.ndarray,
+    reach: float | None = None,
+    shells: bool = True,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Minus twice the log-likelihood of each place of the outline, (rays, places), by the shell that suits the ray and its
-    neighbours best; and each ray's least misfit."""
+    neighbours best; and each ray's least misfit. A ray is looked at as far as it is blurred, or all as far as `reach`."""
     from toolkit.motion.compiled import address, call
 
     rays, kinds = len(profile), _SHIFTS.size * (1 + _SHELLS.size)
@@ -193,10 +253,11 @@ def _weigh(
     ends = np.flatnonzero(np.diff(blurs, prepend=-1, append=-1))
     runs = []
     for begin, end in pairwise(ends.tolist()):
-        model = _model(edge, int(blurs[begin]), noise)
+        blur = int(blurs[begin])
+        model = _model(edge, blur, noise, _reach(edge, blur) if reach is None else reach, shells)
         size = model.within.shape[1]
-        first, shells = round((model.first_px - r[0]) / _STEP), len(model.volume) // _SHIFTS.size
-        runs.append((begin, end, first, size, shells, *model.addresses))
+        first, kinds_here = round((model.first_px - r[0]) / _STEP), len(model.volume) // _SHIFTS.size
+        runs.append((begin, end, first, size, kinds_here, *model.addresses))
     arrays = (
         np.ascontiguousarray(profile.T[:, order]),
         np.array(runs, np.int64),
@@ -221,13 +282,13 @@ def _kernel(name: str, module: str) -> Any:
 
 
 def _likeliest(
-    cost: np.ndarray, ux: np.ndarray, uy: np.ndarray, inside: np.ndarray
+    cost: np.ndarray, ux: np.ndarray, uy: np.ndarray, inside: np.ndarray, spread_px: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """x, y and radius (px off the present ones) of the least robust sum, their variances, and each ray's misfit there."""
     from toolkit.motion.compiled import address, call
 
     numbers = np.zeros(64)
-    numbers[:4] = _SHIFTS[0], _SHIFTS[1] - _SHIFTS[0], _FAR, _RADIUS
+    numbers[:4] = _SHIFTS[0], _SHIFTS[1] - _SHIFTS[0], _FAR, spread_px
     result, apart = np.empty(6), np.empty(ux.size)
     arrays = (np.ascontiguousarray(cost), ux, uy, inside.astype(float), numbers, result, apart)
     call(_kernel("likeliest", "_outline_kernel"), *(address(a) for a in arrays), *cost.shape)

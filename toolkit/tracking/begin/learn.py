@@ -12,7 +12,7 @@ from toolkit.trackers import load_tracker, tracker_names
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.tracking.begin.acquire import is_even, scattered
-from toolkit.tracking.begin.bold import learn_bold
+from toolkit.tracking.begin.bold import STEADY, learn_bold, positions
 from toolkit.tracking.begin.trail import Rough, cut
 from toolkit.tracking.geometry.swing import CALM, Swing, fit_swing
 from toolkit.tracking.picture.background import Background
@@ -27,8 +27,8 @@ from toolkit.video import Frame
 _CHECK_EVERY = 12
 _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
-_WAVERS = 0.02  # of the radius: what strays more from a swing may be a bold pattern's outline, taken for another
-_CALMER = 0.85  # times as far strays a bob that is looked at as it is
+_WAVERS = 0.02  # of the radius: what strays more from a swing may have a pattern up to its outline
+_CALM = 1.5  # times as far as another's: places of some forty frames that stray more do so by no chance
 _ROUND = 0.75  # of the outline: of a bold pattern's less is to be seen now and then
 # of the outline, at least, where the bob is said to be found; and of one with a bold pattern
 _SHOWS, _HARDLY = 0.6, 0.1
@@ -37,10 +37,12 @@ _LESS = 0.8  # of the misfit: by so much a bob with a pattern is explained bette
 
 
 class Trial(NamedTuple):
-    """A localiser on the frames read ahead: on how many it finds the bob, the motion fitted to its places, and what misfit, how
-    much of the outline (at two speeds) and which brightness of the bob (and scatter of it) are ordinary for it."""
+    """A localiser on the frames read ahead, with the looks it took the bob to have: on how many it finds the bob, the motion fitted
+    to its places, and what misfit, how much of the outline (at two speeds) and which brightness of the bob (and scatter of it)
+    are ordinary for it."""
 
     localiser: Localiser
+    looks: Looks
     found: int
     swing: Swing
     misfit: float
@@ -317,61 +319,86 @@ class Known:
         rough: Look,
         radius: float | None,
     ) -> Localiser:
-        """The localiser asked for; else the disc fit where its model holds; else of all there are the one whose model leaves
-        least of the picture unexplained (χ²), `choice` says of which. Also learns what is ordinary for it."""
-        names = [wanted] if wanted else ["disc"]
-        if not wanted and (not self.look.even or self.look.noise > 0.05 * abs(self.look.contrast) + 2.5):
-            names += [name for name in tracker_names() if name != "disc"]
-        tried = [t for t in (self._try(load_tracker(name), batch, points) for name in names) if t is not None]
-        if not tried:
-            return load_tracker(names[0])
-        if len(names) > 1:
-            self.choice = _told_choice(tried, abs(self.look.contrast))
+        """The localiser asked for; else the disc fit where its model holds; else the one whose model leaves least of the picture
+        unexplained (χ²), of the outline fit and the disc fit or, for a bob of one shade, of all there are: `choice` says of which.
+        Also learns what is ordinary for it."""
+        looks = Looks(self.look, self.exposure_s, self.growth)
+        first = self._try(load_tracker(wanted or "disc"), looks, batch, points)
+        tried = [first]
+        poor = self.look.noise > 0.05 * abs(self.look.contrast) + 2.5
+        doubted = not wanted and (poor or not self.look.even)
+        if doubted:
+            edge = load_tracker("edge")
+            drawn = poor and not (looks.look.even and first and first.swing.rms_px < _WAVERS * looks.look.radius_px)
+            own = self._try_outline(edge, batch, points, rough, radius, looks) if drawn else None
+            given = self._try(edge, looks, batch, points)
+            calmer = own is not None and (given is None or own.swing.rms_px < given.swing.rms_px)
+            tried.append(own if calmer else given)
+            if looks.look.even or not any(tried):  # parts of a pattern pull the middle of what is like the bob
+                others = (name for name in tracker_names() if name not in ("disc", "edge"))
+                tried += [self._try(load_tracker(name), looks, batch, points) for name in others]
+        self.look, self.exposure_s, self.growth = looks
+        found = [trial for trial in tried if trial is not None]
+        if not found:
+            return load_tracker(wanted or "disc")
+        if doubted:
+            self.choice = _told_choice(found, abs(self.look.contrast))
         # whatever it explains, what leaps about was not found; what errs alike on all frames does not leap
-        calm = 2.0 * min(t.swing.rms_px for t in tried) + max(0.05, 0.01 * self.look.radius_px)
+        calm = _CALM * min(t.swing.rms_px for t in found) + max(0.05, 0.01 * self.look.radius_px)
         # a model with more freedom leaves less of any picture; what an outline that is no circle leaves hardly moves a bob of one shade
         less = 0.0 if self.look.even else 0.7
         best = min(
-            (t for t in tried if t.swing.rms_px < calm and not any(other.finds_more_than(t) for other in tried)),
+            (t for t in found if t.swing.rms_px < calm and not any(other.finds_more_than(t) for other in found)),
             key=lambda t: t.misfit * (less if t.localiser.name == "disc" else 1.0),
         )
-        calmest = min(t.swing.rms_px for t in tried)
-        if len(names) > 1 and calmest > _WAVERS * rough.radius_px:
-            best = self._try_bold(batch, points, rough, radius, _CALMER * calmest) or best
+        self.look, self.exposure_s, self.growth = best.looks
         self.swing, self.ordinary_misfit, self.ordinary_visible = best.swing, best.misfit, best.visible
         self.ordinary_shade = best.shade
+        if best.looks != looks:
+            self.bold = min(best.visible[1]) < _ROUND
+            if self.bold:
+                self.ordinary_visible = (0.0, 1.0), (_HARDLY, _HARDLY)
+            if self.bold and best.swing.rms_px < STEADY * self.look.radius_px:
+                t_s = np.array([batch[i].t_s for i in points])
+                points = dict(zip(points, positions(self.swing, t_s)))
+                self.found |= {batch[i].index: p for i, p in points.items()}
+            self._learn_background(batch, self.look, points)
         return best.localiser
 
-    def _try_bold(
+    def _try_outline(
         self,
+        edge: Localiser,
         batch: list[Frame],
         points: dict[int, tuple[float, float]],
         rough: Look,
         radius: float | None,
-        calm_px: float,
+        looks: Looks,
     ) -> Trial | None:
-        """Its outline as that of a bob with a bold pattern, which is then what is known of the bob: None, and all is as before, where
-        it strays more than so far from a swing, or its outline is to be seen all round."""
+        """The outline fit with the looks that the outlines themselves have, but that the bob grows as the disc fit has learned; None
+        where they tell none."""
         t_s = np.array([batch[i].t_s for i in points])
-        learned = learn_bold(self._sightings(batch, points), t_s, rough, self.swing, radius)
+        seen = self._sightings(batch, points)
+        learned = learn_bold(seen, t_s, rough, self.swing, radius, self.interval_s)
         if learned is None:
             return None
-        before = self.look, self.exposure_s, self.growth, self.swing
-        self.look, self.exposure_s, self.growth, self.bold = learned.look, 0.0, None, True
         if learned.calm:
-            self.swing = learned.swing
-            points = dict(zip(points, zip(*(c.tolist() for c in self.swing.position(t_s)))))
-        trial = self._try(load_tracker("edge"), batch, points)
-        if trial is None or trial.swing.rms_px > calm_px or min(trial.visible[1]) > _ROUND:
-            self.look, self.exposure_s, self.growth, self.swing = before
-            self.bold = False
-            return None
-        self.found |= {batch[i].index: p for i, p in points.items()}
-        self._learn_background(batch, self.look, points)
-        return trial._replace(visible=((0.0, 1.0), (_HARDLY, _HARDLY)))
+            points = dict(zip(points, positions(learned.swing, t_s)))
+        look, slope = learned.looks.look, None if looks.growth is None else looks.growth[0]
+        growth = None if slope is None else (slope, look.radius_px - slope * float(np.median(seen.x_px)))
+        outlined = Looks(look._replace(radius_free=looks.look.radius_free), learned.looks.exposure_s, growth)
+        return self._try(edge, outlined, batch, points, _HARDLY)
 
-    def _try(self, localiser: Localiser, batch: list[Frame], points: dict[int, tuple[float, float]]) -> Trial | None:
-        """What this localiser makes of the frames on which the bob was found; None where it sees it on too few."""
+    def _try(
+        self,
+        localiser: Localiser,
+        looks: Looks,
+        batch: list[Frame],
+        points: dict[int, tuple[float, float]],
+        shows: float = _SHOWS,
+    ) -> Trial | None:
+        """What this localiser makes of the frames on which the bob was found, if it looks so; None where it sees it, or this share of
+        its outline, on too few."""
+        self.look, self.exposure_s, self.growth = looks
         velocity = self.swing.velocity(np.array([batch[i].t_s for i in points]))
         places = {}
         for i, vx, vy in zip(points, *(v * self.exposure_s for v in velocity)):
@@ -379,7 +406,7 @@ class Known:
             patch = self._patch(batch[i], self.look, guess)
             place = NOWHERE if patch is None else localiser.locate(patch, self.look_at(guess), guess)
             place, _ = self._beside_shadow(localiser, batch[i], guess, place) or (place, patch)
-            if np.isfinite(place.x_px) and place.visible > (_HARDLY if self.bold else _SHOWS):
+            if np.isfinite(place.x_px) and place.visible > shows:
                 places[i] = place
         if len(places) < 10 or len(places) <= 0.5 * len(points):
             return None
@@ -399,7 +426,7 @@ class Known:
         shades = np.array([(p.contrast + p.wall) / p.light for p in places.values()])
         shade = float(np.median(shades))
         return Trial(
-            localiser, len(places), swing, *ordinary, (shade, 1.4826 * float(np.median(np.abs(shades - shade))))
+            localiser, looks, len(places), swing, *ordinary, (shade, 1.4826 * float(np.median(np.abs(shades - shade))))
         )
 
     # --- geometry -------------------------------------------------------------------------------------------------
