@@ -81,3 +81,29 @@ def test_where_the_tracker_asks_for_a_click_the_page_says_how(lang, tmp_path):
     assert str(tmp_path) not in told
     assert told.endswith(words("web.click_here"))
     assert words("web.click_here") not in _told(JobError("a.mp4 is empty (0 bytes)"), visit, words)
+
+
+def test_what_was_put_in_stays_when_the_language_is_changed():
+    from nicegui import ui
+    from nicegui.testing import user_simulation
+
+    from toolkit.report.words import load_words
+    from toolkit.web.page import build_page
+
+    film = ROOT / "data" / "samples" / "pendulum.mp4"
+
+    async def visit() -> None:
+        async with user_simulation(root=build_page) as user:
+            await user.open("/")
+            user.find(marker="mass").type("0.25")
+            (upload,) = user.find(ui.upload).elements
+            await upload.handle_uploads([ui.upload.SmallFileUpload(film.name, "video/mp4", film.read_bytes())])
+            await user.should_see(marker="frame", retries=50)
+            (choice,) = user.find(marker="lang").elements
+            choice.set_value("th")
+            await user.should_see(load_words("th")("web.go"))
+            await user.should_see(film.name)
+            await user.should_see(marker="frame")
+            assert [box.value for box in user.find(marker="mass").elements] == [0.25]
+
+    asyncio.run(visit())

@@ -23,6 +23,8 @@ from toolkit.report.speech import say_error
 from toolkit.report.words import Words, languages, load_words
 from toolkit.scene import Environment, Pendulum, Scene
 
+_NUMBERS = {"mass": None, "length": None, "radius": None, "gravity": 9.80665, "slow": 1.0}
+
 
 @dataclass
 class _Visit:
@@ -30,6 +32,8 @@ class _Visit:
 
     folder: Path
     recording: Path | None = None
+    picture: tuple[str, tuple[int, int]] | None = None  # the first frame of a video, as `_first_frame` gives it
+    numbers: dict[str, float | None] = field(default_factory=lambda: dict(_NUMBERS))
     clicks: dict[str, tuple[float, float]] = field(default_factory=dict)
     stage: tuple[str, float] = ("", 0.0)
 
@@ -62,27 +66,29 @@ def _content(visit: _Visit, lang: str) -> None:
     async def receive(event: events.UploadEventArguments) -> None:
         path = visit.folder / Path(event.file.name).name
         await event.file.save(path)
-        visit.recording, visit.clicks = path, {}
-        frame_place.clear()
+        visit.recording, visit.picture, visit.clicks = path, None, {}
         try:
             if is_video(path):
-                picture, size = await asyncio.to_thread(_first_frame, path)
-                with frame_place:
-                    _frame(visit, words, picture, size)
+                visit.picture = await asyncio.to_thread(_first_frame, path)
         except PendulabError as error:
             ui.notify(_told(error, visit, words), type="negative", multi_line=True)
+        show()
+
+    def show() -> None:
+        frame_place.clear()
+        with frame_place:
+            if visit.recording is not None:
+                ui.label(visit.recording.name).classes("font-bold")
+            if visit.picture is not None:
+                _frame(visit, words, *visit.picture)
 
     accept = ",".join(sorted(VIDEO_SUFFIXES | SERIES_SUFFIXES))
     upload = ui.upload(label=words("web.upload"), auto_upload=True, on_upload=receive).props(f'accept="{accept}"')
     upload.classes("w-full").move(target_index=1)
     with ui.row().classes("w-full"):
-        mass = ui.number(words("web.mass"), min=0, format="%.6g")
-        length = ui.number(words("web.length"), min=0, format="%.6g")
-        radius = ui.number(words("web.radius"), min=0, format="%.6g")
-        gravity = ui.number(words("web.gravity"), value=9.80665, min=0, format="%.6g")
-        slow = ui.number(words("web.slow"), value=1, min=0, format="%.6g")
-        for field_ in (mass, length, radius, gravity, slow):
-            field_.classes("w-full sm:w-72")
+        for name in _NUMBERS:
+            box = ui.number(words(f"web.{name}"), min=0, format="%.6g").bind_value(visit.numbers, name)
+            box.classes("w-full sm:w-80").mark(name)
     result = ui.column().classes("w-full")
 
     async def go() -> None:
@@ -101,11 +107,9 @@ def _content(visit: _Visit, lang: str) -> None:
 
         timer = ui.timer(0.2, show_stage)
         try:
-            scene = Scene(
-                pendulum=Pendulum(mass.value or None, length.value or None, radius.value or None),
-                environment=Environment(g_m_per_s2=gravity.value or None),
-            )
-            await _analyse(visit, scene, words, slow.value or 1.0, result)
+            mass, length, radius, gravity, slow = (visit.numbers[name] or None for name in _NUMBERS)
+            scene = Scene(pendulum=Pendulum(mass, length, radius), environment=Environment(g_m_per_s2=gravity))
+            await _analyse(visit, scene, words, slow or 1.0, result)
         except Exception as error:
             if not isinstance(error, PendulabError):
                 logging.getLogger(__name__).exception("a report could not be made")
@@ -119,6 +123,7 @@ def _content(visit: _Visit, lang: str) -> None:
     button = ui.button(words("web.go"), on_click=go).mark("go")
     button.move(target_index=-1)
     result.move(target_index=-1)
+    show()
 
 
 def _told(error: Exception, visit: _Visit, words: Words) -> str:
@@ -150,6 +155,7 @@ def _frame(visit: _Visit, words: Words, picture: str, size: tuple[int, int]) -> 
         image.content = ""
 
     image = ui.interactive_image(picture, on_mouse=click, cross=True, sanitize=False).classes("w-full").mark("frame")
+    image.content = marks()
     ui.button(words("web.forget"), on_click=forget).props("flat")
 
 
