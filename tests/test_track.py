@@ -148,6 +148,18 @@ def test_a_hand_holds_the_bob_before_its_release_and_catches_it(tmp_path):
     assert not found.meta["warnings"]
 
 
+def test_a_fitted_motion_is_told_without_whole_turns():
+    t = np.arange(120) / FPS
+    theta = angles(t)
+    x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
+    turn = 2 * np.pi
+    start = np.array([*PIVOT, LENGTH, -3 * turn, OMEGA**2, 0.02, 0.0, theta[0] + 4 * turn, 0.0])
+    swing = fit_swing(t, x, y, np.full(t.size, 0.1), start)
+    assert swing is not None
+    assert abs(swing.values[NAMES.index("vertical")]) < 0.01
+    np.testing.assert_allclose(swing.angle(t)[0], theta, atol=1e-3)
+
+
 def test_a_swing_that_dies_away_is_not_held():
     t = np.arange(1200) / 60
     rng = np.random.default_rng(1)

@@ -40,6 +40,19 @@ def test_motions_solved_at_once_are_those_that_scipy_finds():
     np.testing.assert_array_equal(solve_swing(motions[1], t[1]), found[1])
 
 
+def test_a_motion_that_no_frames_could_tell_is_no_number_and_takes_no_time():
+    """A fit on its way nowhere may ask for one of a million turns a second: minutes, step by step."""
+    ordinary = np.array([0, 0, 500, 0, 18, 0.05, 0.1, 0.6, 0.3])
+    mad = np.array([[*ordinary[:8], 1e9], [*ordinary[:4], 1e17, *ordinary[5:]], [*ordinary[:8], np.inf]])
+    t = np.linspace(0, 4, 200)
+    first, *others = solve_swing(np.array([ordinary, *mad]), np.tile(t, (4, 1)))
+    np.testing.assert_array_equal(first, solve_swing(ordinary, t))
+    assert np.isfinite(first).all()
+    assert np.isnan(others).all()
+    hour = solve_swing(ordinary, np.arange(0, 3600, 0.5))
+    assert np.isfinite(hour).all()
+
+
 def test_more_motions_than_are_integrated_side_by_side_and_a_few_times():
     rng = np.random.default_rng(7)
     motions = np.array([0, 0, 500, 0, 18, 0.05, 0.1, 2.9, 0.3]) * rng.uniform(0.9, 1.1, (11, 9))

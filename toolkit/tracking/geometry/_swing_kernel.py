@@ -20,6 +20,9 @@ MOTIONS, ROOM, TIMES, COUNT = range(4)
 LANES = 8
 _THETA, _RATE, _SINE, _COSINE, _W2, _GAMMA, _BETA, _NOW, _LONGEST, _STEP, _STEPS, _END = (k * LANES for k in range(12))
 SPARE = _END
+# steps of one motion, each a tenth of a radian or less: some 5000 swings, an hour's; what asks for more, a fit on its way to where no
+# frames could tell it, is no number
+_MOST = 300_000.0
 _AFRESH = 8  # times after which sine and cosine are computed, not turned on
 
 
@@ -76,6 +79,12 @@ def swing(places: Any) -> None:
             fast = 0.33 * abs(values[8])  # a step turns it by no more than `turned` can
             slow = math.sqrt(abs(values[4]) + 1e-12)
             longest[k] = 0.1 / (fast if fast > slow else slow)
+            way, last = 0.0, 0.0
+            for i in range(times):
+                way += abs(values[9 + i] - last)
+                last = values[9 + i]
+            if not way <= _MOST * longest[k]:
+                theta[k], rate[k], longest[k] = math.nan, math.nan, math.inf
         for i in range(times):
             most = 0
             for k in range(used):

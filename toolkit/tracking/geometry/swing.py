@@ -10,6 +10,7 @@ from __future__ import annotations
 from ctypes import addressof, c_double, c_void_p, cast
 from dataclasses import dataclass
 from functools import cache
+from math import remainder, tau
 from typing import Any
 
 import numpy as np
@@ -102,7 +103,8 @@ def _place(values: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def solve_swing(values: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """(2, n): θ and its rate at times t (n,) after that of the state in `values`, integrated from each to the next.
+    """(2, n): θ and its rate at times t (n,) after that of the state in `values`, integrated from each to the next; NaN of a motion
+    that would turn thousands of times more often than frames could tell.
 
     Of several motions at once, `values` (k, 9 or more) each at its own times (k, n): (k, 2, n).
     """
@@ -184,7 +186,9 @@ def fit_swing(
         return None
     x, y = _place(least.values, solve_swing(least.values, t)[0])
     rms = float(np.sqrt((np.sum((x - x_px) ** 2) + np.sum((y - y_px) ** 2)) / dof))
-    return Swing(least.values, covariance, t0, rms)
+    values = least.values.copy()
+    values[3], values[7] = (remainder(angle, tau) for angle in (values[3], values[7]))  # whole turns change no place
+    return Swing(values, covariance, t0, rms)
 
 
 def fit_circle(x: np.ndarray, y: np.ndarray, weight: np.ndarray | None = None) -> tuple[float, float, float, float]:
