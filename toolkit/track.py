@@ -265,7 +265,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     good = places.good
     off_px = misfit * look.radius_px / 3
     strings = _strings(record, places, shake, look.radius_px, fps_factor)
-    camera = Camera(size_px, pivot, turned, max(0.02, off_px), fps_factor, look.even)
+    camera = Camera(size_px, pivot, turned, max(0.02, off_px), fps_factor, look.even, follower.shadow is not None)
     lines = strings.seen()
     joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
     # with tilt, lens and shutter taken out some are no strays, and others hid in these

@@ -45,15 +45,16 @@ class Bars:
         self.kind = None if places.kind is None else places.kind[good]
         self.time_sigma_s, self.unsteady_px, self.slow_px = time_sigma_s, unsteady_px, slow_px
 
-    def about(self, x_px: np.ndarray, y_px: np.ndarray, rough: bool = False) -> ErrorBars:
-        """Those about a motion that has the bob there, (n,); a `rough` one is known to leave much unexplained."""
+    def about(self, x_px: np.ndarray, y_px: np.ndarray, rough: bool = False, full: bool = False) -> ErrorBars:
+        """Those about a motion that has the bob there, (n,); a `rough` one is known to leave much unexplained, a `full` one was seen
+        with every camera effect free."""
         good = self.places.good
         rest = np.array([self.places.x_px - x_px, self.places.y_px - y_px])[:, good]
-        factors = self._factors(rest, self.own, rough)
+        factors = self._factors(rest, self.own, rough, full)
         of_type = np.ones(self.places.t_s.size)
         if not rough and self.kind is not None and np.ptp(self.kind) > 0:
             of_type[good] = self._of_types(rest, factors)
-            factors = self._factors(rest, self.own * of_type[good])
+            factors = self._factors(rest, self.own * of_type[good], full=full)
         return ErrorBars(
             factors.x,
             factors.y,
@@ -62,7 +63,7 @@ class Bars:
             self.places.sigma_y_px * factors.y * of_type,
         )
 
-    def _factors(self, rest: np.ndarray, own: np.ndarray, rough: bool = False) -> Factors:
+    def _factors(self, rest: np.ndarray, own: np.ndarray, rough: bool = False, full: bool = False) -> Factors:
         """What makes the σ `own` agree with the residuals, both (2, n)."""
         found = true_sigma(
             self.t_s,
@@ -74,6 +75,7 @@ class Bars:
             self.unsteady_px,
             rough,
             self.slow_px,
+            full,
         )
         if not self.shake.taken:
             return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,8 @@ _SETTLED = 0.6  # another view is fitted only where the last made σ smaller tha
 
 class Camera(NamedTuple):
     """What is known of the camera before a view is fitted: the picture's size, the pivot if given, along which axis its rows
-    are read, how far the places may be off the bob's centre, true frame rate over the file's, whether the bob is of one shade."""
+    are read, how far the places may be off the bob's centre, true frame rate over the file's, whether the bob is of one shade, and
+    whether it casts a shadow beside it."""
 
     size_px: tuple[int, int]
     pivot_px: tuple[float, float] | None
@@ -30,6 +32,7 @@ class Camera(NamedTuple):
     off_px: float
     fps_factor: float
     even: bool = True
+    shaded: bool = False
 
 
 class Joint(NamedTuple):
@@ -44,7 +47,11 @@ class Joint(NamedTuple):
 def fit_jointly(
     places: Places, swing: Swing, shake: Shake, time_sigma_s: float, lines: Lines | None, camera: Camera
 ) -> Joint:
-    """The camera's view of the motion, and the error bars about it."""
+    """The camera's view of the motion, and the error bars about it.
+
+    A bob of one shade is found without errors that return with the place, but for its shadow's: what a view with every camera effect free
+    explains is the camera's then, though too little of it to be shown, and no error of the places.
+    """
     t, good = places.t_s, places.good
     velocity = np.array(swing.velocity(t))
     late_x, late_y = np.hypot(velocity * time_sigma_s, shake.sigma)
@@ -74,7 +81,9 @@ def fit_jointly(
         if found is None:
             break
         seen = found.position(when, joint.x_px, joint.y_px)
-        joint = Joint(found, bars.about(*seen), *seen)
+        best = found.likeliest if camera.even and not camera.shaded else None
+        told = seen if best is None else replace(found, values=best).position(when, joint.x_px, joint.y_px)
+        joint = Joint(found, bars.about(*told, full=best is not None), *seen)
         after = joint.bars
         if not found.shown or min(after.x / scale.x, after.y / scale.y) > _SETTLED:
             break

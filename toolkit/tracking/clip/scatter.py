@@ -12,6 +12,7 @@ from toolkit.tracking.clip.band import beyond_band
 _FITS = 2.5  # a motion fits where places stray from it by less than so many times their scatter from frame to frame
 _CLOCK = 3.0  # by how much a localiser may be worse along the motion than across it
 _ALONG, _ACROSS = 8, 2  # so many values a fitted motion has taken from the residuals along it and across it,
+_CAMERA = 3  # and the six effects of the camera that bend it so many more of each
 _LEFT = 0.85  # but of their mean square it has left so much
 _CARRIED = 1.06  # times what changes from frame to frame: a codec carries its errors on into the next pictures
 _CODEC_PX = 0.05  # so far a codec may err for long
@@ -42,6 +43,7 @@ def true_sigma(
     unsteady_px: float = np.inf,
     rough: bool = False,
     slow_px: float = 0.0,
+    full: bool = False,
 ) -> Factors:
     """Make the fit's σ agree with the residuals about a motion, all (n,) for x and y over the measured frames at t_s, less
     what the shake and the clock are known to add. `unsteady_px` is the most that the camera can have moved, `slow_px` the most
@@ -51,7 +53,8 @@ def true_sigma(
     stood still, its residuals are the localiser's errors, slow ones too (a
     codec's, a shadow's, a pattern's). Where it does not, what changes from frame to frame is the localiser's; the rest is a
     camera's shake as far as it is across the motion, where no pendulum moves and no clock errs. About a `rough` motion, or
-    where a shake was taken away, only what changes from frame to frame tells of the localiser.
+    where a shake was taken away, only what changes from frame to frame tells of the localiser. `full` if the motion was seen with every
+    camera effect free.
     """
     (rx, ry), (sx, sy), (vx, vy) = residuals, sigmas, velocity
     speed = np.hypot(vx, vy) + 1e-9
@@ -71,7 +74,7 @@ def true_sigma(
     for r, s, late, scatter, way in zip(all_r, all_s, clock, quick_scatter(t_s, all_r, all_s), ways):
         known = float(np.mean((np.hypot(late, shake_px) / s) ** 2))
         quick = _less(float(scatter) ** 2, known)
-        taken = _ACROSS + (_ALONG - _ACROSS) * way
+        taken = _ACROSS + (_ALONG - _ACROSS) * way + (_CAMERA if full else 0)
         whole = _less(float(np.mean((r / s) ** 2)) / _left(r / s, step_rad, taken), known)
         fits.append(whole <= _FITS**2 * quick)
         wholly.append(bool(fits[-1] or (slow and np.isfinite(whole))) and not (rough or np.any(shake_px)))

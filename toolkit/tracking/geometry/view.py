@@ -42,6 +42,7 @@ class View:
 
     samples (m, 19), weights (m,) : what else the clip and the priors allow, every camera effect free.
     inflation : by how much the residuals exceed the positions' own σ, their correlation included.
+    likeliest : (19,), the values that explain the clip best with every effect free, shown or not.
     """
 
     values: np.ndarray
@@ -53,6 +54,7 @@ class View:
     t0_s: float
     inflation: float
     rows_along_x: bool = False
+    likeliest: np.ndarray | None = None
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[AT[name]])

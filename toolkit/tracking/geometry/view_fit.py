@@ -148,8 +148,9 @@ def fit_view(
     except np.linalg.LinAlgError:
         return None
     return View(
-        chosen.values, covariance, samples, weights, shown, model.middle_px, model.t0_s, problem.weaker, rows_along_x
-    )
+        chosen.values, covariance, samples, weights, shown, model.middle_px, model.t0_s, problem.weaker, rows_along_x,
+        modes[0].values,
+    )  # fmt: skip
 
 
 def _names(shown: tuple[str, ...]) -> tuple[str, ...]:
