@@ -48,6 +48,13 @@ class Trial(NamedTuple):
     misfit: float
     visible: tuple[tuple[float, float], tuple[float, float]]
     shade: tuple[float, float]
+    strays_px: dict[int, float]  # from the swing, on each frame
+
+    def calmer_than(self, other: Trial) -> bool:
+        """Does it stray less, on the frames on which both find the bob?"""
+        both = self.strays_px.keys() & other.strays_px.keys()
+        mine, its = (sum(trial.strays_px[i] ** 2 for i in both) for trial in (self, other))
+        return mine < its
 
     def finds_more_than(self, other: Trial) -> bool:
         """Does it find the bob on more frames, and no less calmly?"""
@@ -332,7 +339,7 @@ class Known:
             drawn = poor and not (looks.look.even and first and first.swing.rms_px < _WAVERS * looks.look.radius_px)
             own = self._try_outline(edge, batch, points, rough, radius, looks) if drawn else None
             given = self._try(edge, looks, batch, points)
-            calmer = own is not None and (given is None or own.swing.rms_px < given.swing.rms_px)
+            calmer = own is not None and (given is None or own.calmer_than(given))
             tried.append(own if calmer else given)
             if looks.look.even or not any(tried):  # parts of a pattern pull the middle of what is like the bob
                 others = (name for name in tracker_names() if name not in ("disc", "edge"))
@@ -425,8 +432,10 @@ class Known:
         ordinary = float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear])
         shades = np.array([(p.contrast + p.wall) / p.light for p in places.values()])
         shade = float(np.median(shades))
+        scatter = 1.4826 * float(np.median(np.abs(shades - shade)))
+        strays = np.hypot(*(drawn - at for drawn, at in zip(swing.position(t), (x, y))))
         return Trial(
-            localiser, looks, len(places), swing, *ordinary, (shade, 1.4826 * float(np.median(np.abs(shades - shade))))
+            localiser, looks, len(places), swing, *ordinary, (shade, scatter), dict(zip(places, strays.tolist()))
         )
 
     # --- geometry -------------------------------------------------------------------------------------------------
