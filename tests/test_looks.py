@@ -99,6 +99,16 @@ def test_a_size_that_grows_is_learned_though_something_dark_passes_where_the_bob
     assert found.growth[0] == pytest.approx(0.02, abs=0.003)
 
 
+def test_a_wall_that_is_darker_on_one_side_does_not_change_which_sightings_tell():
+    """There the bob has a third of the contrast: that side is asked for more, which are as little like the others."""
+    x = np.linspace(24, 140, 40)
+    speed = np.full(40, 300.0) + x
+    speed[[0, 1, 2, 3, 34, 35, 36, 37, 38, 39]] = 20.0
+    seen = growing(x, speed, np.full(40, 12.0), np.where(x < 82, 105.0, 180.0))
+    found = learn_looks(seen, Look(12.0, 1.0, -80.0, 8.0), None, 1e-4, (100, 160))
+    assert found.look.contrast == pytest.approx(-110, abs=3)
+
+
 def test_what_a_rolling_shutter_shears_is_not_hidden():
     speed = np.linspace(0, 1000, 100)
     (slow, fast), (least_slow, least_fast) = _by_speed(speed, np.where(speed > 700, 0.8, 1.0))

@@ -89,10 +89,11 @@ def learn_looks(
 
     def sized(look: Look) -> dict[int, np.ndarray]:
         fits = fitted(look, slow)
-        alike = _of_one_contrast(fits)
+        usual = _usual_contrast(fits)
+        alike = _of_contrast(usual, fits)
         for side in sides:  # where something passes behind the bob as it turns, the next slowest tell
             if sum(k in alike for k in side.tolist()) < _FEW:
-                fits |= fitted(look, side[~np.isin(side, slow)][:8])
+                fits |= _of_contrast(usual, fitted(look, side[~np.isin(side, slow)][:8]))
         return fits
 
     for turn in range(2):  # the streak widens the edge, the edge shortens the streak
@@ -143,11 +144,12 @@ def _slow(speed: np.ndarray, sides: list[np.ndarray]) -> np.ndarray:
     return np.concatenate([side[:8] for side in sides]) if min(map(len, sides)) >= 4 else slow
 
 
-def _of_one_contrast(fits: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-    """Those of about the usual contrast: the others ran away, or something else stands behind the bob."""
-    if not fits:
-        return fits
-    usual = sorted(f[_CONTRAST] for f in fits.values())[len(fits) // 2]
+def _usual_contrast(fits: dict[int, np.ndarray]) -> float:
+    return float(sorted(f[_CONTRAST] for f in fits.values())[len(fits) // 2]) if fits else np.nan
+
+
+def _of_contrast(usual: float, fits: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """Those of about this contrast: the others ran away, or something else stands behind the bob."""
     return {k: f for k, f in fits.items() if 0.5 < f[_CONTRAST] / usual < 2.0}
 
 
@@ -163,7 +165,7 @@ def _size(
 ) -> tuple[Look, tuple[float, float] | None]:
     """The looks that most fits agree on; and the line along which the radius grows, where the bob is larger on one side."""
     x_px = seen.x_px
-    fits = _of_one_contrast(fits)
+    fits = _of_contrast(_usual_contrast(fits), fits)
     table = np.array(list(fits.values()))
     middle = np.median(table, axis=0)
     size, edge, contrast, noise = (float(middle[n]) for n in (_RADIUS, _EDGE, _CONTRAST, _MISFIT))
