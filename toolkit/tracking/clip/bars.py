@@ -54,7 +54,12 @@ class Bars:
         of_type = np.ones(self.places.t_s.size)
         if not rough and self.kind is not None and np.ptp(self.kind) > 0:
             of_type[good] = self._of_types(rest, factors)
-            factors = self._factors(rest, self.own * of_type[good], full=full)
+            sigma = self.own * of_type[good]
+            if factors.wholly and not self.time_sigma_s:  # of the residuals only their mean square is another
+                x, y = (_rms(tamed(r / s)) / _rms(tamed(r / o)) for r, s, o in zip(rest, sigma, self.own))
+                factors = factors._replace(x=factors.x * x, y=factors.y * y)
+            else:
+                factors = self._factors(rest, sigma, full=full)
         return ErrorBars(
             factors.x,
             factors.y,
@@ -106,3 +111,7 @@ class Bars:
         known = beyond.mixes((self.velocity * self.time_sigma_s / unit).T ** 2).T
         squares = np.array([tamed(r) for r in beyond.rest]) ** 2
         return factors_of_types(self.kind, squares.ravel(), np.concatenate(own), known.ravel(), 2 * beyond.left)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -49,7 +49,7 @@ def fit_jointly(
 ) -> Joint:
     """The camera's view of the motion, and the error bars about it.
 
-    A bob of one shade is found without errors that return with the place, but for its shadow's: what a view with every camera effect free
+    A bob of one shade that is found in its middle has no errors that return with the place, but for its shadow's: what a view with every camera effect free
     explains is the camera's then, though too little of it to be shown, and no error of the places.
     """
     t, good = places.t_s, places.good
@@ -81,7 +81,8 @@ def fit_jointly(
         if found is None:
             break
         seen = found.position(when, joint.x_px, joint.y_px)
-        best = found.likeliest if camera.even and not camera.shaded else None
+        plain = camera.even and not camera.shaded and "bob" not in found.shown
+        best = found.likeliest if plain else None
         told = seen if best is None else replace(found, values=best).position(when, joint.x_px, joint.y_px)
         joint = Joint(found, bars.about(*told, full=best is not None), *seen)
         after = joint.bars
