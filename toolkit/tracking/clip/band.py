@@ -51,7 +51,7 @@ def beyond_band(t_s: np.ndarray, series: np.ndarray, unit: np.ndarray) -> Beyond
     functions, gone = [], np.zeros((2, waves + 1))
     for span in spans:
         late = t_s[span] - t_s[span][0]
-        phase = 2 * np.pi / (_LONGER * late[-1]) * np.outer(late, np.arange(1, waves + 1))
+        phase = 2 * np.pi / max(_LONGER * late[-1], 1e-9) * np.outer(late, np.arange(1, waves + 1))
         columns = np.empty((late.size, 1 + 2 * waves))
         columns[:, 0], columns[:, 1::2], columns[:, 2::2] = 1.0, np.cos(phase), np.sin(phase)
         functions.append(np.linalg.qr(columns / unit[span, None])[0])
