@@ -60,3 +60,32 @@ def test_a_picture_that_lies_on_its_side_is_tracked_upright(swing, tmp_path, deg
     assert found.ok.all()
     errors = np.concatenate([found.x_px - x, found.y_px - y])
     assert np.sqrt(np.mean(errors**2)) < 0.05
+
+
+def test_a_hand_in_the_picture_holds_the_bob_and_lets_go(tmp_path):
+    """For most of what the search looks at, its fingers over the bob; then it goes away to the right."""
+    rng = np.random.default_rng(5)
+    t, released = np.arange(220) / FPS, 1.2
+    held = t < released
+    theta = np.interp(t - released, t, angles(t)) + held * np.convolve(
+        rng.normal(0, 0.003, t.size), np.ones(9) / 3, "same"
+    )
+    x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
+    away = np.where(held, 0.0, 300 * (t - released))
+    rows, columns = np.mgrid[0:240, 0:320]
+    frames = []
+    for a, b, far, hold in zip(x, y, away, held):
+        frame = draw(a, b, rng)
+        hx, hy = (a, b) if hold else (x[0] + far, y[0] + 0.5 * far)
+        arm = (columns > hx + 14) & (np.abs(rows - hy - 0.4 * (columns - hx)) < 18)
+        fingers = (np.abs(np.abs(rows - hy) - 8) < 4) & (columns > hx - 5) & (columns < hx + 25)
+        frame[arm | fingers] = np.clip(150 + rng.normal(0, 1.5, int((arm | fingers).sum())), 0, 255)
+        frames.append(frame)
+    found = track(write(tmp_path / "hand.mp4", np.array(frames)))
+    swings = t > released + 0.1
+    assert found.frame.size == t.size
+    assert found.ok[swings].mean() > 0.97
+    assert not found.ok[t < released - 0.1].any()
+    assert np.sqrt(np.mean(np.square([found.x_px - x, found.y_px - y])[:, found.ok])) < 0.05
+    assert "track.released" in [getattr(line, "key", "") for line in found.meta["log"]]
+    assert not found.meta["warnings"]

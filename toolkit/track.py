@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain, islice, pairwise
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from toolkit.tracking.clip.clock import (
     strays_told,
     timed_swing,
 )
-from toolkit.tracking.clip.hands import held_still
+from toolkit.tracking.clip.hands import held_still, not_swinging_yet
 from toolkit.tracking.clip.held import held_swing
 from toolkit.tracking.clip.joint import Camera, fit_jointly
 from toolkit.tracking.clip.outline import pulled_by_string
@@ -43,8 +44,12 @@ from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
 
-_BYTES_ASIDE = 1e7  # of luma: what is decoded while the bob is searched for; each new frame costs memory, which takes time too
+_BYTES_ASIDE = (
+    1e7  # of luma: what is decoded while the bob is searched for; each new frame costs memory, which takes time too
+)
 
+# which of the frames are searched, one after the other: a slow swing, slow motion, a hand that holds the bob need a longer time
+_EVERY = (1, 3, 9)
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
 
 
@@ -113,15 +118,17 @@ def track(
     if localiser is not None:
         load_tracker(localiser)
     video = open_video(video_path)
-    progress("searching", 0.0)
-    follower, frames = _begin(video, pivot, bob, radius, localiser, start_s, stop_s)
-    expected = _expected_frames(video, start_s, stop_s)
-    for count, frame in enumerate(_some_at_once(frames)):
-        follower.follow(frame)
-        if count % 64 == 0:
-            progress("tracking", min(1.0, count / expected))
-    progress("tracking", 1.0)
-    return _finish(video, follower, pivot, fps_factor)
+    follow = partial(_follow, video, pivot=pivot, radius=radius, localiser=localiser, stop_s=stop_s, progress=progress)
+    refusal: JobError | None = None
+    for every in _EVERY:
+        try:
+            follower = follow(bob=bob, start_s=start_s, every=every)
+            if follower is None:
+                break
+            return _finish(video, _from_release(follower, follow, bob is not None), pivot, fps_factor)
+        except JobError as error:
+            refusal = refusal or error
+    raise refusal  # type: ignore[misc]
 
 
 def write_track_csv(track: Track, path: str | Path) -> None:
@@ -139,6 +146,52 @@ def write_track_csv(track: Track, path: str | Path) -> None:
 # --- the pieces ---------------------------------------------------------------------------------------------------
 
 
+def _follow(
+    video: Video,
+    *,
+    pivot: tuple[float, float] | None,
+    bob: tuple[float, float] | None,
+    radius: float | None,
+    localiser: str | None,
+    start_s: float | None,
+    stop_s: float | None,
+    every: int,
+    progress: Progress,
+) -> Follower | None:
+    """What has followed the bob through all frames; None where every n-th frame are too few to search."""
+    progress("searching", 0.0)
+    begun = _begin(video, pivot, bob, radius, localiser, start_s, stop_s, every)
+    if begun is None:
+        return None
+    follower, frames = begun
+    expected = _expected_frames(video, start_s, stop_s)
+    for count, frame in enumerate(_some_at_once(frames)):
+        follower.follow(frame)
+        if count % 64 == 0:
+            progress("tracking", min(1.0, count / expected))
+    progress("tracking", 1.0)
+    return follower
+
+
+def _from_release(follower: Follower, follow: Callable[..., Follower | None], bob_given: bool) -> Follower:
+    """Where a hand holds or hides the bob at first, what has followed it anew from its release on: else the hand is in what was
+    learned of the bob, and of what stands still. The follower itself where none does, or the bob is not found there."""
+    record = follower.record
+    times = np.array(record.t_s)
+    late = not_swinging_yet(Places.of(record, times - times[0]))
+    if not late:
+        return follower
+    try:
+        again = follow(bob=record.place[late][:2] if bob_given else None, start_s=record.t_s[late], every=1)
+    except JobError:
+        return follower
+    if again is None:
+        return follower
+    again.record.precede(record, late)
+    again.late = late
+    return again
+
+
 def _begin(
     video: Video,
     pivot: tuple[float, float] | None,
@@ -147,36 +200,30 @@ def _begin(
     localiser: str | None,
     start_s: float | None,
     stop_s: float | None,
-) -> tuple[Follower, Iterator[Frame]]:
-    """A follower that knows the bob, and all frames to be followed.
+    every: int = 1,
+) -> tuple[Follower, Iterator[Frame]] | None:
+    """A follower that knows the bob, and all frames to be followed; None where every n-th frame are too few to search.
 
-    Ordinarily the search looks at the first frames, kept in memory, and the file is decoded once. Where these do not
-    show it (a slow swing, slow motion), every third or ninth frame over a longer time is searched, and the file decoded again.
+    Ordinarily the search looks at the first frames, kept in memory, and the file is decoded once. With every third or ninth frame
+    over a longer time the file is decoded again.
     """
-    first: JobError | None = None
-    for every in (1, 3, 9):
-        used = _between(iter(video), start_s, stop_s)
-        batch = _read_ahead(used, every)
-        if every == 1:
-            _require_frames(batch, video)
-        elif len(batch) < 12:
-            break
-        more = int(_BYTES_ASIDE / batch[0].luma.size) if every == 1 else 0
-        try:
-            with ThreadPoolExecutor(1) as aside:  # other processors decode on while this one searches
-                later = aside.submit(list, islice(used, more))
-                rough = find_bob(batch, bob, radius, str(video.path))
-                follower = Follower(batch, rough, pivot, radius, localiser)
-        except JobError as error:
-            first = first or error
-            continue
-        if every == 1:
-            follower.first = batch
-            return follower, chain(batch, later.result(), used)
-        follower.interval_s /= every
-        follower.exposure_s = min(follower.exposure_s, follower.interval_s)
-        return follower, _between(iter(video), start_s, stop_s)
-    raise first  # type: ignore[misc]
+    used = _between(iter(video), start_s, stop_s)
+    batch = _read_ahead(used, every)
+    if every == 1:
+        _require_frames(batch, video)
+    elif len(batch) < 12:
+        return None
+    more = int(_BYTES_ASIDE / batch[0].luma.size) if every == 1 else 0
+    with ThreadPoolExecutor(1) as aside:  # other processors decode on while this one searches
+        later = aside.submit(list, islice(used, more))
+        rough = find_bob(batch, bob, radius, str(video.path))
+        follower = Follower(batch, rough, pivot, radius, localiser)
+    if every == 1:
+        follower.first = batch
+        return follower, chain(batch, later.result(), used)
+    follower.interval_s /= every
+    follower.exposure_s = min(follower.exposure_s, follower.interval_s)
+    return follower, _between(iter(video), start_s, stop_s)
 
 
 def _some_at_once(frames: Iterator[Frame], count: int = 16) -> Iterator[Frame]:
@@ -240,12 +287,20 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     t = even_times(np.array(record.t_s), video, log)
     time_sigma = video.tick_s / np.sqrt(12) if video.tick_s > 2e-4 and not log else 0.0
     places = Places.of(record, t - t[0])
-    _require_seen(places, video)
+    _require_seen(places.good[follower.late :], video)
     shake = Shake(follower, places.good)
     if follower.unsteady:
         shake.look_at_string(places, _strings(record, places, shake, look.radius_px, fps_factor))
     places = replace(places, x_px=places.x_px + shake.raw_x - shake.x, y_px=places.y_px + shake.raw_y - shake.y)
     stamps = places.t_s
+    if follower.late:
+        log.append(
+            said(
+                "track.released",
+                "the bob is held or hidden until t = {t_s:.2f} s: it was looked for from there on",
+                t_s=float(stamps[follower.late]),
+            )
+        )
     places = held_still(places, log)
 
     followed = replace(follower.swing, t0_s=follower.swing.t0_s - record.t_s[0])
@@ -287,7 +342,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     motion = swing if joint.view is None else joint.view.swing(fps_factor)
     if not joint.bars.shake_px:  # a shaking camera leaps too
         warnings += slips_told(places, swing, joint.x_px, joint.y_px)
-    warnings += poor_motion(motion, places.t_s, good, rms_px, typical, look.radius_px, shake.by_string)
+    followed_at, seen = places.t_s[follower.late :], good[follower.late :]
+    warnings += poor_motion(motion, followed_at, seen, rms_px, typical, look.radius_px, shake.by_string)
     warnings += poor_picture(misfit, look.even, off_px, rms_px)
     for odd in clock_warnings(stamps, video):  # what the stamps account for affects no result
         (log if getattr(odd, "key", "") in _HARMLESS else warnings).append(odd)
@@ -383,8 +439,8 @@ def _out_of_step(
     return untimely, stray if again is None else again
 
 
-def _require_seen(places: Places, video: Video) -> None:
-    seen, of = int(places.good.sum()), places.good.size
+def _require_seen(good: np.ndarray, video: Video) -> None:
+    seen, of = int(good.sum()), good.size
     if seen < max(8, 0.3 * of):
         raise JobError(f"the bob was seen on only {seen} of {of} frames of {video.path}; {REMEDY}")
 

@@ -50,6 +50,14 @@ class Record:
     string: dict[int, tuple[float, ...]] = field(default_factory=dict)
     pull: dict[int, tuple[float, float]] = field(default_factory=dict)  # by the string on the bob's place, px
 
+    def precede(self, other: Record, count: int) -> None:
+        """Put as many of the other's first frames before these; the bob is seen on none of them."""
+        self.index[:0], self.t_s[:0] = other.index[:count], other.t_s[:count]
+        self.place[:0], self.shift[:0] = [NOWHERE] * count, [None] * count
+        self.ok[:0], self.repeated[:0] = [False] * count, [False] * count
+        self.string = {k + count: line for k, line in self.string.items()}
+        self.pull = {k + count: pull for k, pull in self.pull.items()}
+
 
 class Follower(Known):
     """Follows one bob, given what was found in the frames read ahead: call `follow` with every frame in order and read
@@ -65,6 +73,7 @@ class Follower(Known):
     ) -> None:
         super().__init__(batch, rough, pivot, radius, wanted)
         self.record = Record()
+        self.late = 0  # frames of the record before those that were followed
         self.hidden = 0
         self.astray = 0.0  # how far the bob was from the fitted motion lately, px
         self._fitted_at = 0

@@ -37,6 +37,14 @@ def held_still(places: Places, log: list[str]) -> Places:
     return left
 
 
+def not_swinging_yet(places: Places) -> int:
+    """On how many frames, from the first on, a hand holds the bob or hides it; 0 where that is no longer than other things hide it."""
+    if places.good.sum() < 8:  # no motion to speak of
+        return 0
+    released = int(np.argmax(held_still(places, []).good))
+    return released if places.t_s[released] - places.t_s[0] > _LEAST_S else 0
+
+
 def _stays(places: Places, order: np.ndarray) -> int:
     """On how many frames, in this order, the bob is where it is on the first ones."""
     points = np.column_stack([places.x_px, places.y_px])[order]
