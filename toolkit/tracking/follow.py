@@ -52,7 +52,7 @@ class Record:
 
     def precede(self, other: Record, count: int) -> None:
         """Put as many of the other's first frames before these; the bob is seen on none of them."""
-        self.index[:0], self.t_s[:0] = other.index[:count], other.t_s[:count]
+        self.index[:0], self.t_s[:0], self.kind[:0] = other.index[:count], other.t_s[:count], other.kind[:count]
         self.place[:0], self.shift[:0] = [NOWHERE] * count, [None] * count
         self.ok[:0], self.repeated[:0] = [False] * count, [False] * count
         self.string = {k + count: line for k, line in self.string.items()}
