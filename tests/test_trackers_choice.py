@@ -18,6 +18,17 @@ LOOKS = {
         "edge",
         0.2,
     ),
+    "two_coloured": (  # a slope of brightness nearly tells the halves: the bob wavers less than with the outline fit
+        {
+            "look": "two_coloured",
+            "colour_rgb": [90, 80, 70],
+            "second_rgb": [235, 235, 235],
+            "strength": 0.5,
+            "spin_rad_per_s": 2.0,
+        },
+        "disc",
+        0.04,
+    ),
 }
 
 
@@ -26,12 +37,12 @@ def test_the_localiser_that_explains_the_bob_is_taken_and_named(tmp_path, name):
     look, expected, allowed = LOOKS[name]
     scene = Scene.from_dict(
         {
-            "pendulum": {"mass_kg": 0.1, "length_m": 0.4, "bob_radius_m": 0.04},
+            "pendulum": {"mass_kg": 0.1, "length_m": 0.4, "bob_radius_m": 0.05 if name == "two_coloured" else 0.04},
             "release": {"theta0_rad": 0.4},
             "camera": {
                 "width_px": 320, "height_px": 240, "fps": 30, "duration_s": 2.5, "px_per_m": 400, "pivot_px": [160.3, 30.4],
                 "seed": 5, "sensor_noise": {"read_sigma": 2.0}, "bob_look": {"colour_rgb": [50, 60, 70], **look},
-                "codec": {"name": "lossless"},
+                "codec": {"name": "lossless"}, "wall": {"colour_rgb": [190, 190, 190]} if name == "two_coloured" else {},
             },
         }
     )  # fmt: skip

@@ -29,6 +29,7 @@ _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
 _WAVERS = 0.02  # of the radius: what strays more from a swing may have a pattern up to its outline
 _CALM = 1.5  # times as far as another's: places of some forty frames that stray more do so by no chance
+_CLEARLY = 1.15  # times as far on the same frames, some fifty: by chance alone it is less
 _ROUND = 0.75  # of the outline: of a bold pattern's less is to be seen now and then
 # of the outline, at least, where the bob is said to be found; and of one with a bold pattern
 _SHOWS, _HARDLY = 0.6, 0.1
@@ -50,11 +51,11 @@ class Trial(NamedTuple):
     shade: tuple[float, float]
     strays_px: dict[int, float]  # from the swing, on each frame
 
-    def calmer_than(self, other: Trial) -> bool:
-        """Does it stray less, on the frames on which both find the bob?"""
+    def calmer_than(self, other: Trial, times: float = 1.0) -> bool:
+        """Does the other stray more (than so many times as far), on the frames on which both find the bob?"""
         both = self.strays_px.keys() & other.strays_px.keys()
         mine, its = (sum(trial.strays_px[i] ** 2 for i in both) for trial in (self, other))
-        return mine < its
+        return times**2 * mine < its
 
     def finds_more_than(self, other: Trial) -> bool:
         """Does it find the bob on more frames, and no less calmly?"""
@@ -354,8 +355,11 @@ class Known:
         calm = _CALM * min(t.swing.rms_px for t in found) + max(0.05, 0.01 * self.look.radius_px)
         # a model with more freedom leaves less of any picture; what an outline that is no circle leaves hardly moves a bob of one shade
         less = 0.0 if self.look.even else 0.7
+        # a pattern that pulls its place makes the bob waver, however well the picture is explained
+        waver = [not self.look.even and any(other.calmer_than(t, _CLEARLY) for other in found) for t in found]
+        steady = [t for t, wavers in zip(found, waver) if t.swing.rms_px < calm and not wavers] or found
         best = min(
-            (t for t in found if t.swing.rms_px < calm and not any(other.finds_more_than(t) for other in found)),
+            (t for t in steady if not any(other.finds_more_than(t) for other in steady)),
             key=lambda t: t.misfit * (less if t.localiser.name == "disc" else 1.0),
         )
         self.look, self.exposure_s, self.growth = best.looks
