@@ -8,7 +8,8 @@ from toolkit.sentence import said
 from toolkit.tracking.clip.places import Places
 from toolkit.tracking.geometry.swing import fit_swing, start_swing
 
-_STILL, _STILL_PX = 0.01, 0.5  # of the swing's extent, and px: what moves less stands still
+# of the swing's extent (a hand trembles by some mm where a bob swings some dm), and px: what moves less stands still
+_STILL, _STILL_PX = 0.03, 0.5
 _LEAST_S = 0.2  # a pendulum turns in less
 _EVENER = 0.3  # times as far strays what is left from a swing, where a hand held the bob
 
