@@ -337,7 +337,7 @@ class Known:
         doubted = not wanted and (poor or not self.look.even)
         if doubted:
             edge = load_tracker("edge")
-            drawn = poor and not (looks.look.even and first and first.swing.rms_px < _WAVERS * looks.look.radius_px)
+            drawn = not (looks.look.even and first and first.swing.rms_px < _WAVERS * looks.look.radius_px)
             own = self._try_outline(edge, batch, points, rough, radius, looks) if drawn else None
             given = self._try(edge, looks, batch, points)
             calmer = own is not None and (given is None or own.calmer_than(given))
