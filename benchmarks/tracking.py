@@ -432,6 +432,8 @@ def run_speed(video: Path, repeats: int = 3) -> None:
     frames = found.frame.size
     runs = [(timed(lambda: sum(1 for _ in open_video(video))), timed(lambda: track(video))) for _ in range(repeats)]
     decode, whole = np.min(runs, axis=0) / frames * 1e6
+    bare = np.min([timed(lambda: sum(1 for _ in open_video(video, filtered=False))) for _ in range(repeats)], axis=0)
+    bare *= 1e6 / frames
     batch = _read_ahead(iter(open_video(video)))
     search = cpu(lambda: find_bob(batch, None, None, str(video)))
     follower, _ = _begin(open_video(video), None, None, None, None, None, None)
@@ -454,6 +456,9 @@ def run_speed(video: Path, repeats: int = 3) -> None:
             f"  {kind + ' time':26s}decoding alone {alone:.0f}, whole tracking {all_of_it:.0f} us a frame: "
             f"{alone / all_of_it:.2f} of the decoding rate (limit 0.90)"
         )
+    print(
+        f"  decoding without the loop filter of B pictures, as tracking does: {bare[0]:.0f} us passing, {bare[1]:.0f} us CPU"
+    )
     try:
         import resource
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -93,29 +95,50 @@ def test_types_of_which_there_are_few_pictures_are_drawn_towards_what_is_usual()
     assert 1 / 1.4 < np.exp(np.mean(np.log(ratios))) < 1.0
 
 
-def test_error_bars_hold_for_the_types_of_a_film(tmp_path):
+def filmed(path, **camera):
+    """The truth of a film of a pendulum, rendered into `path`."""
     pytest.importorskip("av")
-    from toolkit import Scene, render, track
+    from toolkit import Scene, render
+
+    size = {"width_px": 640, "height_px": 360, "fps": 60, "px_per_m": 500, "pivot_px": [320.3, 20.4], "seed": 5}
+    scene = {
+        "pendulum": {"mass_kg": 0.1, "length_m": 0.55, "bob_radius_m": 0.03},
+        "release": {"theta0_rad": 0.4},
+        "camera": {**size, **camera},
+    }
+    return render(Scene.from_dict(scene), path)
+
+
+def test_error_bars_hold_for_the_types_of_a_film(tmp_path):
+    film = tmp_path / "film.mkv"
+    codec = {"name": "h264", "bit_rate_bit_per_s": 3e6, "keyframe_interval": 30}
+    truth = filmed(film, duration_s=5.0, sensor_noise={"read_sigma": 2.0}, codec=codec)
+    from toolkit import track
     from toolkit.video import open_video
 
-    camera = {
-        "width_px": 640, "height_px": 360, "fps": 60, "duration_s": 5.0, "px_per_m": 500, "pivot_px": [320.3, 20.4], "seed": 5,
-        "sensor_noise": {"read_sigma": 2.0},
-        "codec": {"name": "h264", "bit_rate_bit_per_s": 3e6, "keyframe_interval": 30},
-    }  # fmt: skip
-    scene = Scene.from_dict(
-        {
-            "pendulum": {"mass_kg": 0.1, "length_m": 0.55, "bob_radius_m": 0.03},
-            "release": {"theta0_rad": 0.4},
-            "camera": camera,
-        }
-    )
-    truth = render(scene, tmp_path / "film.mkv")
-    found = track(tmp_path / "film.mkv")
-    kind = np.array([frame.kind for frame in open_video(tmp_path / "film.mkv")])
+    found = track(film)
+    kind = np.array([frame.kind for frame in open_video(film)])
     ratio = np.array([(found.x_px - truth.x_px) / found.sigma_x_px, (found.y_px - truth.y_px) / found.sigma_y_px])
     ratio -= ratio[:, found.ok].mean(axis=1, keepdims=True)
     assert found.ok.all()
     for one in (1, 2, 3):
         assert np.sum(kind == one) >= 8
         assert np.sqrt(np.mean(ratio[:, kind == one] ** 2)) == pytest.approx(1.0, abs=0.3)
+
+
+def test_without_the_loop_filter_the_bob_is_found_as_well(tmp_path, monkeypatch):
+    """Coarsely coded, so that the filter has much to smooth."""
+    film = tmp_path / "film.mkv"
+    codec = {"name": "h264", "bit_rate_bit_per_s": 4e5}
+    truth = filmed(film, duration_s=4.0, texture={"rms": 4.0, "scale_px": 8.0}, codec=codec)
+    from toolkit import track
+    from toolkit.video import open_video
+
+    bare = track(film)
+    monkeypatch.setattr(sys.modules[track.__module__], "open_video", lambda path, filtered: open_video(path))
+    whole = track(film)
+    both = bare.ok & whole.ok
+    assert both.mean() > 0.95
+    assert np.any(bare.x_px != whole.x_px)
+    off_bare, off_whole = (np.hypot(f.x_px - truth.x_px, f.y_px - truth.y_px)[both] for f in (bare, whole))
+    assert np.sqrt(np.mean(off_bare**2)) < 1.05 * np.sqrt(np.mean(off_whole**2))

@@ -30,6 +30,24 @@ def write(path, count=20, size=(64, 48), codec="libx264", pixels="yuv420p", stam
     return path
 
 
+def test_without_the_loop_filter_no_picture_changes_from_which_others_are_drawn(tmp_path):
+    rng = np.random.default_rng(2)
+    wall = rng.uniform(60, 190, (12, 16)).repeat(16, axis=0).repeat(16, axis=1)
+    with av.open(str(tmp_path / "v.mkv"), "w") as container:
+        stream = container.add_stream("libx264", rate=Fraction(30))
+        stream.width, stream.height, stream.pix_fmt, stream.options = 256, 192, "yuv420p", {"crf": "34", "bf": "3"}
+        for i in range(40):
+            grey = np.clip(np.roll(wall, 3 * i, axis=1) + rng.normal(0, 3, wall.shape), 0, 255).astype(np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(grey, format="gray").reformat(format="yuv420p")))
+        container.mux(stream.encode())
+    whole, bare = (list(open_video(tmp_path / "v.mkv", filtered=filtered)) for filtered in (True, False))
+    assert [f.t_s for f in whole] == [f.t_s for f in bare]
+    changed = np.array([np.any(a.luma != b.luma) for a, b in zip(whole, bare)])
+    between = np.array([frame.kind == 3 for frame in whole])  # B pictures
+    assert changed[between].mean() > 0.5
+    assert not changed[~between].any()
+
+
 @pytest.mark.parametrize(
     ("suffix", "codec", "pixels"),
     [

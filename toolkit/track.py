@@ -44,9 +44,8 @@ from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
 
-_BYTES_ASIDE = (
-    1e7  # of luma: what is decoded while the bob is searched for; each new frame costs memory, which takes time too
-)
+# of luma: what is decoded while the bob is searched for; each new frame costs memory, which takes time too
+_BYTES_ASIDE = 1e7
 
 # which of the frames are searched, one after the other: a slow swing, slow motion, a hand that holds the bob need a longer time
 _EVERY = (1, 3, 9)
@@ -117,7 +116,7 @@ def track(
         raise UsageError(f"radius must be positive, got {radius}")
     if localiser is not None:
         load_tracker(localiser)
-    video = open_video(video_path)
+    video = open_video(video_path, filtered=False)
     follow = partial(_follow, video, pivot=pivot, radius=radius, localiser=localiser, stop_s=stop_s, progress=progress)
     refusal: JobError | None = None
     for every in _EVERY:
