@@ -32,3 +32,21 @@ def test_spots_are_those_that_numpy_looks_at(x: float, y: float):
             assert told is None
         else:
             assert told == (clear.sum(), tells.sum(), bobs.sum())
+
+
+@pytest.mark.parametrize("length", [14.0, 40.0])
+def test_a_streak_shows_the_bob_as_long_as_it_is_there(length: float):
+    size, x, y, radius, streak = 100, 50.0, 49.5, 12.0, (length, 0.3 * length)
+    rows, columns = np.ogrid[:size, :size]
+    way = np.linspace(-0.5, 0.5, 401)
+    there = np.mean([np.hypot(columns - x - u * streak[0], rows - y - u * streak[1]) < radius for u in way], axis=0)
+    still = np.full((size, size), 180.0, np.float32)
+    picture = (180 - 120 * there).astype(np.float32)
+    half = np.where(columns < x, picture, still)  # a post of the wall's brightness stands before the other half
+
+    def told(image: np.ndarray):
+        return tell_bob(Patch(image, still, still, 0.0, 0.0), still, None, (x, y, radius), 60.0, 1.0, 10.0, streak)
+
+    whole, hidden = told(picture), told(half)
+    assert whole.bobs > 0.97 * whole.seen and whole.seen == WITHIN.shape[1]
+    assert 0.4 < hidden.bobs / hidden.tells < 0.6

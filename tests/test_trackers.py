@@ -78,6 +78,22 @@ def test_disc_error_bars_are_true_and_blur_is_modelled():
         assert abs(np.mean(pulls)) < 0.4
 
 
+@pytest.mark.parametrize("length", [20.0, 34.0, 62.0])
+def test_a_streak_is_found_from_far_along_it_and_its_error_bar_is_true(length):
+    # the ends of a streak longer than the bob look another way than its outline seen from the streak's middle
+    streak, off, seen = (length, 0.1 * length), [], []
+    still = draw(70.0, 70.0, streak, size=140)
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        patch = patch_of((still + rng.normal(0, NOISE, still.shape)).astype(np.float32))
+        aside = 5.0 if seed % 2 else -5.0
+        place = load_tracker("disc").locate(patch, LOOK, Guess(370.0 + aside, 570.0 + 0.1 * aside, *streak))
+        off.append((place.x_px - 370) / place.sigma_x_px)
+        seen.append(place.visible)
+    assert min(seen) > 0.9
+    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.7
+
+
 def test_a_half_hidden_bob_is_said_to_be():
     image = draw(28.0, 28.0)
     image[:, 30:] = 110.0

@@ -150,15 +150,13 @@ def measure_depth(
 @loop
 def cover_still(
     x: Any, y: Any, n: int, cx: float, cy: float, radius: float, soft: float,
-    near: Any, share: Any, rise: Any, widen: Any,
+    right: Any, down: Any, share: Any, rise: Any, widen: Any,
 ) -> None:  # fmt: skip
-    """What a disc at rest covers of each pixel, its slopes with the radius and with h, and one over the pixel's distance from
-    the centre."""
+    """What a disc at rest covers of each pixel, and its slopes with the centre, the radius and h."""
     for i in range(n):
         dx, dy = x[i] - cx, y[i] - cy
         square = dx * dx + dy * dy + 1e-18
         one = 1.0 / math.sqrt(square)
-        near[i] = one
         v = (radius - one * square) / soft
         v = 1.0 if v > 1.0 else -1.0 if v < -1.0 else v
         q = v * v
@@ -166,15 +164,19 @@ def cover_still(
         e = (K0 + q * (K1 + q * (K2 + q * (K3 + q * K4)))) / soft
         rise[i] = e
         widen[i] = -e * v
+        e *= one
+        right[i] = e * dx
+        down[i] = e * dy
 
 
 @loop
 def cover_moving(
-    depth: Any, lift: Any, n: int, part: float, soft: float, before: Any, edge: Any, whole: Any,
-    share: Any, rise: Any, widen: Any,
+    depth: Any, near: Any, lift: Any, n: int, part: float, soft: float, before: Any, edge: Any, whole: Any, closer: Any,
+    share: Any, rise: Any, widen: Any, aside: Any,
 ) -> None:  # fmt: skip
     """Add what it covers while the depth goes evenly from `before` to `depth` in `part` of the exposure (0: only note the
-    start): the differences of the edge function's integral and of itself, over the way."""
+    start): the differences of the edge function's integral and of itself, over the way. `aside`: its slope with the centre
+    across the way, over the pixel's distance from the way; `near`, and `closer` before, is one over that from the centre."""
     for i in range(n):
         a = before[i]
         b = depth[i] + lift[i]
@@ -189,10 +191,38 @@ def cover_moving(
         e = one * (level - edge[i]) / soft
         middle = 0.5 * (a + b)
         rise[i] += e
+        aside[i] += 0.5 * e * (near[i] + closer[i])
+        closer[i] = near[i]
         widen[i] -= e * (1.0 if middle > 1.0 else -1.0 if middle < -1.0 else middle)
         before[i] = b
         edge[i] = level
         whole[i] = sum_
+
+
+@loop
+def lean(
+    x: Any,
+    y: Any,
+    n: int,
+    cx: float,
+    cy: float,
+    bx: float,
+    by: float,
+    began: Any,
+    edge: Any,
+    aside: Any,
+    right: Any,
+    down: Any,
+) -> None:
+    """The slopes with the centre of what a moving disc covers. Moved along its way it covers what it does a little later: the slope
+    is the difference of what it covers at the end and of what it did as it `began`, over the way."""
+    one = 1.0 / math.sqrt(bx * bx + by * by)
+    ux, uy = bx * one, by * one
+    for i in range(n):
+        along = (edge[i] - began[i]) * one
+        across = aside[i] * ((y[i] - cy) * ux - (x[i] - cx) * uy)
+        right[i] = along * ux - across * uy
+        down[i] = along * uy + across * ux
 
 
 @loop
@@ -201,7 +231,8 @@ def compare(
     share: Any, rest: Any, work: Any, free: int,
 ) -> None:  # fmt: skip
     """Slopes of the model with all eight parameters, what it leaves of the picture, and each pixel's weight."""
-    rise, widen, near, weight = skip(work, _RISE), skip(work, _WIDEN), skip(work, _NEAR), skip(work, _WEIGHT)
+    rise, widen, weight = skip(work, _RISE), skip(work, _WIDEN), skip(work, _WEIGHT)
+    right, down = skip(work, _NEAR), skip(work, _DEPTH)
     by_x, by_y, flat, tilt_x = work, skip(work, CHUNK), skip(work, 2 * CHUNK), skip(work, 3 * CHUNK)
     tilt_y, by_gain = skip(work, 4 * CHUNK), skip(work, 5 * CHUNK)
     by_radius, by_soft = skip(work, 6 * CHUNK), skip(work, 7 * CHUNK)
@@ -217,13 +248,11 @@ def compare(
         by_soft[i] = step
         weight[i] = known[i] / (known[i] + bare * bare) if abs(off) <= cut else 0.0
     for i in range(n):
-        dx, dy, part = x[i] - cx, y[i] - cy, share[i]
-        slope = by_soft[i] * rise[i]
-        by_radius[i] = slope
-        slope *= near[i]
+        dx, dy, part, step = x[i] - cx, y[i] - cy, share[i], by_soft[i]
+        by_radius[i] = step * rise[i]
         flat[i] = part
-        by_x[i] = slope * dx - fx * part
-        by_y[i] = slope * dy - fy * part
+        by_x[i] = step * right[i] - fx * part
+        by_y[i] = step * down[i] - fy * part
         tilt_x[i] = dx * part
         tilt_y[i] = dy * part
     if free == _P:
@@ -302,13 +331,17 @@ def invert(a: Any, size: int, spare: Any) -> bool:
 
 
 @_once
-def look_around(lists: Any, most: int, count: int, disc: Any, clean: float, sectors: Any, out: Any) -> None:
+def look_around(
+    lists: Any, most: int, count: int, disc: Any, length: float, clean: float, sectors: Any, out: Any
+) -> None:
     """out[8] : in how much of the outline's sectors the bob was seen (the model is off by `clean` at most); out[12] : the
     mean level of the wall beside it; out[13] : the misfit (rms, each pixel's at most 2 `clean`) well inside; NaN where no
     such pixel was listed.
 
-    What hides the bob is seen on it, what stands behind it only beside it: pixels that are the bob's for the most part count.
+    What hides the bob is seen on it, what stands behind it only beside it: pixels that are the bob's for at least half as long as any
+    is, while it draws a streak of this `length`, count.
     """
+    long = 2.0 * disc[2] / length if length > 2.0 * disc[2] else 1.0
     y, wall, share, rest = (
         skip(lists, _Y * most), skip(lists, _WALL * most), skip(lists, _SHARE * most), skip(lists, _REST * most)
     )  # fmt: skip
@@ -316,7 +349,7 @@ def look_around(lists: Any, most: int, count: int, disc: Any, clean: float, sect
         sectors[k] = 0.0
     level = squares = beside = within = 0.0
     for i in range(count):
-        if share[i] < 0.5:
+        if share[i] < 0.5 * long:
             level += wall[i]
             beside += 1.0
             continue
@@ -357,6 +390,7 @@ def fit(places: Any) -> None:
     work = skip(lists, LISTS * most)
     rise, widen, near, depth = skip(work, _RISE), skip(work, _WIDEN), skip(work, _NEAR), skip(work, _DEPTH)
     lift, before, edge, whole = skip(work, _LIFT), skip(work, _WEIGHT), skip(work, _EDGE), work
+    began, aside, closer = skip(work, CHUNK), skip(work, 2 * CHUNK), skip(work, 3 * CHUNK)
     normal, right, step = skip(work, _NORMAL), skip(work, _RIGHT), skip(work, _STEP)
     disc, listed, shade = skip(work, _DISC), skip(work, _LISTED), skip(work, _SHADE)
     bx, by, noise, contrast = numbers[STREAK_X], numbers[STREAK_Y], numbers[NOISE], numbers[CONTRAST]
@@ -371,6 +405,7 @@ def fit(places: Any) -> None:
     pieces = pieces if pieces < 16 else 16
     first = 0 if contrast != 0.0 else 1  # the first turn on which the centre moves
     cut, clean, count, level, damp, settled = math.inf, 0.0, 0, 0.0, 1.0, False
+    last_x = last_y = 0.0
     for turn in range(places[TURNS] + first):
         moved = False
         for k in range(4):
@@ -394,19 +429,24 @@ def fit(places: Any) -> None:
             wall, known = skip(lists, _WALL * most + begin), skip(lists, _KNOWN * most + begin)
             share, rest = skip(lists, _SHARE * most + begin), skip(lists, _REST * most + begin)
             if length < 0.05:
-                cover_still(x, y, n, cx, cy, radius, soft, near, share, rise, widen)
+                cover_still(x, y, n, cx, cy, radius, soft, near, depth, share, rise, widen)
             else:
                 measure_depth(x, y, n, cx, cy, radius, soft, depth, near)
                 for i in range(n):
                     across = (bx * (y[i] - cy) - by * (x[i] - cx)) * near[i] / pieces
                     lift[i] = across * across * near[i] / (12.0 * soft)
-                    share[i] = rise[i] = widen[i] = before[i] = edge[i] = whole[i] = 0.0
+                    share[i] = rise[i] = widen[i] = before[i] = edge[i] = whole[i] = aside[i] = closer[i] = 0.0
                 for k in range(pieces + 1):
                     u = k / pieces - 0.5
                     measure_depth(x, y, n, cx + u * bx, cy + u * by, radius, soft, depth, near)
                     part = 1.0 / pieces if k > 0 else 0.0
-                    cover_moving(depth, lift, n, part, soft, before, edge, whole, share, rise, widen)
-                measure_depth(x, y, n, cx, cy, radius, soft, depth, near)
+                    cover_moving(
+                        depth, near, lift, n, part, soft, before, edge, whole, closer, share, rise, widen, aside
+                    )
+                    if k == 0:
+                        for i in range(n):
+                            began[i] = edge[i]
+                lean(x, y, n, cx, cy, bx, by, began, edge, aside, near, depth)
             compare(x, y, n, bright, wall, known, disc, shade, cut, share, rest, work, free)
             add_up(work, rest, n, free, normal, right)
         if not invert(normal, free, step):
@@ -418,6 +458,9 @@ def fit(places: Any) -> None:
         size = math.sqrt(step[0] * step[0] + step[1] * step[1])
         longest = 0.5 * soft + 0.3 * length
         damp = 1.0 if size <= longest else longest / size
+        if step[0] * last_x + step[1] * last_y < -0.5 * (last_x * last_x + last_y * last_y):
+            damp *= 0.5  # to and fro over the least: a streak of another length is flat in its middle
+        last_x, last_y = damp * step[0], damp * step[1]
         for k in range(4):
             shade[k] += damp * step[2 + k]
         disc[0] += damp * step[0]
@@ -442,7 +485,7 @@ def fit(places: Any) -> None:
         if turn >= first:
             cut = 0.25 * abs(shade[0] - shade[3] * level)
             cut = cut if cut > 5.0 * noise else 5.0 * noise
-    look_around(lists, most, count, disc, clean, skip(work, _SECTORS), out)
+    look_around(lists, most, count, disc, length, clean, skip(work, _SECTORS), out)
     if not settled or right[9] < 6.0 or math.isnan(out[12]):
         return
     squares = right[8]

@@ -156,7 +156,7 @@ class Follower(Known):
         again = self._beside_shadow(self.localiser, frame, guess, place)
         if again is not None and self._believe(again[0], guess):
             place, patch = again
-        return place, patch if self._stands_out(patch, place) else None
+        return place, patch if self._stands_out(patch, place, guess) else None
 
     def _before_passer(self, patch: Patch, about: Place | Guess, guess: Guess) -> tuple[Place, Patch] | None:
         """The place before something that passes behind, and that was not there when the background was learned: as if what is
@@ -308,7 +308,7 @@ class Follower(Known):
         seen_so = self.front, place.x_px, place.y_px, self.look.radius_px
         return enough_shows(*seen_so) if self.localiser.name == "disc" else hidden_share(*seen_so) < 0.1
 
-    def _stands_out(self, patch: Patch, place: Place) -> bool:
+    def _stands_out(self, patch: Patch, place: Place, guess: Guess) -> bool:
         """Does the picture show the bob, and not what is known to stand still where it is? Half behind a post of about its own
         brightness it seems whole. It is not believed where a third of it could not be told from what is there without it,
         or where a quarter of what could be told is not the bob's."""
@@ -320,8 +320,9 @@ class Follower(Known):
             return True
         light = max((place.contrast + place.wall) / self._shade_seen, 0.1)
         least = 2 * self.look.noise + 0.05 * abs(self.look.contrast)
-        disc = place.x_px, place.y_px, radius
-        told = tell_bob(patch, self.back.mean, self.front, disc, shade, light, least)  # without the bob's own shadow
+        disc, streak = (place.x_px, place.y_px, radius), (guess.streak_x_px, guess.streak_y_px)
+        # without the bob's own shadow
+        told = tell_bob(patch, self.back.mean, self.front, disc, shade, light, least, streak)
         if told is None or told.seen < 8:  # at the picture's rim
             return True
         return told.tells > _TELLS * told.seen and told.bobs > 0.75 * told.tells

@@ -34,16 +34,18 @@ class Sightings:
         """The disc fitted to sighting k, its centre in pixels of the picture; None where there is none."""
         return self._fit(k, look, (float(self.x_px[k]), float(self.y_px[k])), streak_s, how)
 
-    def fit_from_far(self, k: int, look: Look, streak_s: float) -> np.ndarray | None:
-        """`fit`; and where this sees no outline, once more from where a soft edge, which reaches farther, finds it; but not from beside
-        the bob: a long streak is as faint as the wall's texture."""
-        out = self.fit(k, look, streak_s, turns=6)
+    def fit_from_far(
+        self, k: int, look: Look, streak_s: float, about: tuple[float, float] | None = None
+    ) -> np.ndarray | None:
+        """`fit` (from `about` that place, if it is given); and where this sees no outline, once more from where a soft edge, which
+        reaches farther, finds it; but not from beside the bob: a long streak is as faint as the wall's texture."""
+        out = self._fit(k, look, about or (float(self.x_px[k]), float(self.y_px[k])), streak_s, {"turns": 12})
         if out is not None and out[_VISIBLE] > 0.5:
             return out
         soft = self.fit(k, look._replace(noise=np.inf), streak_s, turns=12, soften=2.5)
         if soft is None or np.hypot(soft[0] - self.x_px[k], soft[1] - self.y_px[k]) > _BESIDE * look.radius_px:
             return None
-        return self._fit(k, look, (soft[0], soft[1]), streak_s, {"turns": 6})
+        return self._fit(k, look, (soft[0], soft[1]), streak_s, {"turns": 12})
 
     def _fit(
         self, k: int, look: Look, centre: tuple[float, float], streak_s: float, how: dict[str, float]
@@ -70,6 +72,13 @@ class Looks(NamedTuple):
     growth: tuple[float, float] | None = None
 
 
+class Clearest(NamedTuple):
+    """Of one sighting's fits that which left least (misfit squared): how little, and its centre, px."""
+
+    cost: float
+    centre: tuple[float, float]
+
+
 def learn_looks(
     seen: Sightings, look: Look, radius: float | None, interval_s: float, shape: tuple[int, ...]
 ) -> Looks | None:
@@ -81,6 +90,7 @@ def learn_looks(
     walls = [w for w in (seen.noise(k, look) for k in slow[::2]) if np.isfinite(w)]
     drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(walls or [0.0]))  # more misfit than noise leaves
     found_px, learned = look.radius_px, Looks(look)
+    clearest: dict[int, Clearest] = {}
 
     def fitted(look: Look, sightings: np.ndarray) -> dict[int, np.ndarray]:
         near = ((int(k), grown(look, learned.growth, float(seen.x_px[k]))) for k in sightings)
@@ -112,7 +122,7 @@ def learn_looks(
             return Looks(look._replace(radius_free=False))  # a pattern up to the outline: it tells no size, no streak
         if speed.max() * interval_s < 1.0:
             break
-        exposure_s = _exposure(seen, learned, fast, interval_s, learned.exposure_s if turn else None)
+        exposure_s = _exposure(seen, learned, fast, interval_s, learned.exposure_s if turn else None, clearest)
         if exposure_s is None:
             break
         learned = learned._replace(exposure_s=exposure_s)
@@ -193,12 +203,19 @@ def _nears(sizes: np.ndarray, x_px: np.ndarray, vx: np.ndarray, range_vx: float)
 
 
 def _exposure(
-    seen: Sightings, learned: Looks, fast: np.ndarray, interval_s: float, about_s: float | None
+    seen: Sightings,
+    learned: Looks,
+    fast: np.ndarray,
+    interval_s: float,
+    about_s: float | None,
+    clearest: dict[int, Clearest],
 ) -> float | None:
     """The exposure whose streak fits the fastest sightings best, looked for from `about_s` on where that is known; None where
     hardly one is fitted.
 
-    A fit that sees no outline says nothing: a long faint streak fits an empty wall well.
+    A fit that sees no outline says nothing: a long faint streak fits an empty wall well. Each starts where the sighting's `clearest`
+    fit was, which becomes known here: a bob that draws a long streak was hardly found in its middle, and a fit that then fails with
+    one exposure, but not with another, would say what it should not.
     """
     trials = np.linspace(0, 1, 11)
     cost = np.full((trials.size, fast.size), np.nan)
@@ -207,10 +224,13 @@ def _exposure(
     wanted = {0, 3, 6} if about_s is None else {round(10 * about_s / interval_s)}
     while wanted - tried:  # until what is best has no untried neighbour
         for j in sorted(wanted - tried):
-            for n, k in enumerate(fast):
-                fit = seen.fit_from_far(k, looks[n], trials[j] * interval_s)
+            for n, k in enumerate(fast.tolist()):
+                best_yet = clearest.get(k)
+                fit = seen.fit_from_far(k, looks[n], trials[j] * interval_s, best_yet and best_yet.centre)
                 if fit is not None and fit[_VISIBLE] > 0.5:
                     cost[j, n] = fit[_MISFIT] ** 2
+                    if best_yet is None or cost[j, n] < best_yet.cost:
+                        clearest[k] = Clearest(cost[j, n], (float(fit[0]), float(fit[1])))
         tried |= wanted
         total = _total(cost, 1)
         if total is None:

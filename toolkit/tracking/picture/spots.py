@@ -32,17 +32,21 @@ def tell_bob(
     shade: float,
     light: float,
     least: float,
+    streak: tuple[float, float] = (0.0, 0.0),
 ) -> Told | None:
     """Does the patch show a bob of this shade on the disc (x, y, radius) under so bright a light, and not what stands `still`,
-    (h, w) float32 of the whole picture? What differs from the shade by no more than `least` tells nothing; nor do spots that
+    (h, w) float32 of the whole picture? On its streak (px) the bob is before each spot for a part of the exposure only, and the spot
+    of a brightness between. What would differ by no more than `least` without it tells nothing; nor do spots that
     something stands before, by `front` (h, w) bool. None where the patch does not hold the disc."""
     x, y, radius = disc
-    numbers = (c_double * 12)(x - patch.x_px, y - patch.y_px, radius, shade, light, least, patch.x_px, patch.y_px)
+    numbers = (c_double * 14)(
+        x - patch.x_px, y - patch.y_px, radius, shade, light, least, patch.x_px, patch.y_px, *streak
+    )  # fmt: skip
     at, image = addressof(numbers), patch.image
     told = kernel("told", "toolkit.tracking.picture._spots_kernel", "the looks at the bob")
     call(
-        told, image.ctypes.data, _WITHIN_AT, at, at + 64, WITHIN.shape[1], *image.shape,
+        told, image.ctypes.data, _WITHIN_AT, at, at + 80, WITHIN.shape[1], *image.shape,
         image.strides[0] // 4, address(still), 0 if front is None else front.ctypes.data, *still.shape,
     )  # fmt: skip
-    whole, seen, tells, bobs = numbers[8:]
+    whole, seen, tells, bobs = numbers[10:]
     return Told(int(seen), int(tells), int(bobs)) if whole else None
