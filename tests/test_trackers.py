@@ -234,6 +234,21 @@ def test_the_outline_is_found_whatever_is_painted_on_the_bob(name):
     assert rms["edge"] < min(allowed, 0.6 * rms["colour_moments"])
 
 
+def test_what_passes_behind_a_painted_bob_is_no_noise():
+    """Something dark stands behind half of it and beside it, which the background that was learned does not show."""
+    rng = np.random.default_rng(8)
+    look, (paint, _), errors = Look(RADIUS, 0.8, -100.0, NOISE, even=False), PAINTS["halves"], []
+    for _ in range(12):
+        x, y = 28 + rng.uniform(-1, 1, 2)
+        bare = painted(x, y, lambda u, v: 0 * u) / WALL
+        passer = np.where(np.arange(56) < x - 2, -60.0, 0.0)
+        image = (painted(x, y, paint) + bare * passer + rng.normal(0, NOISE, (56, 56))).astype(np.float32)
+        place = load_tracker("edge").locate(patch_of(image), look, Guess(300.4 + x, 499.7 + y))
+        errors.append((place.x_px - 300 - x, place.y_px - 500 - y))
+        assert place.misfit < 2 * NOISE + 0.06 * 100
+    assert np.sqrt(np.mean(np.square(errors))) < 0.15
+
+
 def turned(phase):
     """Three dark and three bright stripes round a ball, turned about its upright axis."""
 

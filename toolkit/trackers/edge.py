@@ -34,6 +34,7 @@ _STRAY = 100.0  # the same, before it counts less for which shell its neighbours
 _SEEN_THROUGH = 1  # px of blur along a ray, beyond which no shell is told from the rest
 _BLURS = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48])  # px along a ray
 _BETWEEN = 0.5 * (_BLURS[1:] + _BLURS[:-1])
+_NEAR = 2  # pixels of every other one, beyond which a codec hardly joins their noise
 _SETTLED = 0.3  # px: after a smaller step the rays, taken from before it, would hardly differ
 _POOR = 0.9  # px: after a larger first step the guess was poor
 # standard deviations, all but the last two in units of the contrast:
@@ -157,7 +158,8 @@ def _rays(patch: Patch, look: Look, guess: Guess) -> _Rays:
     """A ray a pixel of the outline, but for those on which the string is expected."""
     picture = np.ascontiguousarray((patch.image - patch.back) / look.contrast, np.float32)
     some = picture[::2, ::2]
-    quiet = 1.4826 * float(np.median(np.abs(some - np.median(some))))
+    # by pixels near each other: what passes behind the bob, and its pattern, have other levels, but no more noise
+    quiet = 1.4826 / np.sqrt(2) * float(np.median(np.abs(some[:, _NEAR:] - some[:, :-_NEAR])))
     noise = float(2.0 ** np.round(np.log2(np.clip(quiet, _FLOOR, 0.2))))
     count = int(max(32, 2 * np.pi * look.radius_px / 0.9))
     angles = (np.arange(count) + 0.5) * 2 * np.pi / count

@@ -32,6 +32,8 @@ _TELLS = 0.65  # of the bob, or of what is beside it: less than this told from w
 _ODD = 1.3  # times the ordinary misfit: with more, something may pass behind the bob
 _BETTER = 0.75  # times that misfit: where less is left, it did
 _DIM = 0.1  # of the light: by so much another light than lately on the wall is none, but something that passes
+# of a bob with a pattern, and of its outline: where so much of this is seen, less than that shows no bob
+_FACE, _AROUND = 0.4, 0.85
 _FACES = 0.5  # of what is about the bob: so much must be told from it, that its outline says where it is
 _UNSTEADY_PX = 0.3  # so far places stray from a swing before a camera that a hand holds
 
@@ -75,6 +77,7 @@ class Follower(Known):
         self.record = Record()
         self.late = 0  # frames of the record before those that were followed
         self.hidden = 0
+        self._outlined = 0.0  # how much of the outline was seen itself, of a bob with a pattern
         self.astray = 0.0  # how far the bob was from the fitted motion lately, px
         self._fitted_at = 0
         self._shade_seen = np.nan  # the bob's own brightness at the place judged last
@@ -193,6 +196,7 @@ class Follower(Known):
         localiser, if it agrees, how exactly."""
         look = self.look
         sure = self.localiser.locate(patch, look, guess)
+        self._outlined = sure.visible
         if self.bold or (sure.visible >= self._least_visible() and 0.25 < sure.contrast / look.contrast < 4.0):
             return sure
         found = self._outline_in(patch, 0.45)
@@ -202,7 +206,9 @@ class Follower(Known):
         place = self.localiser.locate(patch, look, guess._replace(x_px=x, y_px=y))
         believed = {"misfit": self.ordinary_misfit, "visible": min(1.0, share / 0.6), "contrast": look.contrast}
         if np.hypot(place.x_px - x, place.y_px - y) < 0.1 * look.radius_px + 0.5:
+            self._outlined = place.visible
             return place._replace(**believed)
+        self._outlined = 0.0
         sigma = 0.03 * look.radius_px + 0.1
         return Place(x, y, sigma, sigma, **believed)
 
@@ -314,7 +320,10 @@ class Follower(Known):
         or where a quarter of what could be told is not the bob's."""
         if not self.look.even:
             self._unlike_seen = self._unlike(patch, place)
-            return not self._unlike_seen < 0.65 * self._usually_unlike
+            # one of two faces may be like the wall: then nearly half of the bob differs, and its outline is seen all around, unless
+            # the disc fit says so, which leaves out what hides it
+            around = self._outlined >= _AROUND and self.localiser.name != "disc"
+            return not self._unlike_seen < (_FACE if around else _TELLS) * self._usually_unlike
         shade, radius = self._shade, self.look_at(Guess(place.x_px, place.y_px)).radius_px
         if isnan(shade) or not isfinite(place.wall):
             return True
