@@ -415,7 +415,7 @@ def run_speed(video: Path, repeats: int = 3) -> None:
     The time that passes is what a user waits for; CPU time, the sum over all processors, is the stricter measure. Both
     are the least of `repeats` runs, decoding and tracking in turn.
     """
-    from toolkit.track import _begin, _read_ahead
+    from toolkit.track import Asked, _begin, _read_ahead
     from toolkit.trackers import load_tracker
     from toolkit.tracking.begin.acquire import find_bob
     from toolkit.video import open_video
@@ -436,7 +436,7 @@ def run_speed(video: Path, repeats: int = 3) -> None:
     bare *= 1e6 / frames
     batch = _read_ahead(iter(open_video(video)))
     search = cpu(lambda: find_bob(batch, None, None, str(video)))
-    follower, _ = _begin(open_video(video), None, None, None, None, None, None)
+    follower, _ = _begin(open_video(video), Asked())
     frame = batch[len(batch) // 2]
     x, y, vx, vy = follower._expect(frame.t_s)
     guess = follower._guess(x, y, vx * follower.exposure_s, vy * follower.exposure_s)
@@ -444,7 +444,7 @@ def run_speed(video: Path, repeats: int = 3) -> None:
     assert patch is not None
     locate = load_tracker("disc").locate
     fit = cpu(lambda: [locate(patch, follower.look, guess) for _ in range(2000)])
-    begin = cpu(lambda: _begin(open_video(video), None, None, None, None, None, None))
+    begin = cpu(lambda: _begin(open_video(video), Asked()))
     print(
         f"{video.name}: {found.meta['width_px']}x{found.meta['height_px']}, {frames} frames, ok {found.ok.mean():.1%}"
     )

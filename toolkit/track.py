@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import chain, islice, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -117,14 +116,14 @@ def track(
     if localiser is not None:
         load_tracker(localiser)
     video = open_video(video_path, filtered=False)
-    follow = partial(_follow, video, pivot=pivot, radius=radius, localiser=localiser, stop_s=stop_s, progress=progress)
+    asked = Asked(pivot, bob, radius, localiser, start_s, stop_s)
     refusal: JobError | None = None
     for every in _EVERY:
         try:
-            follower = follow(bob=bob, start_s=start_s, every=every)
+            follower = _follow(video, asked, every, progress)
             if follower is None:
                 break
-            return _finish(video, _from_release(follower, follow, bob is not None), pivot, fps_factor)
+            return _finish(video, _from_release(follower, video, asked, progress), pivot, fps_factor)
         except JobError as error:
             refusal = refusal or error
     raise refusal  # type: ignore[misc]
@@ -145,25 +144,25 @@ def write_track_csv(track: Track, path: str | Path) -> None:
 # --- the pieces ---------------------------------------------------------------------------------------------------
 
 
-def _follow(
-    video: Video,
-    *,
-    pivot: tuple[float, float] | None,
-    bob: tuple[float, float] | None,
-    radius: float | None,
-    localiser: str | None,
-    start_s: float | None,
-    stop_s: float | None,
-    every: int,
-    progress: Progress,
-) -> Follower | None:
+class Asked(NamedTuple):
+    """What the caller of `track` said of the clip; None where nothing."""
+
+    pivot: tuple[float, float] | None = None
+    bob: tuple[float, float] | None = None
+    radius: float | None = None
+    localiser: str | None = None
+    start_s: float | None = None
+    stop_s: float | None = None
+
+
+def _follow(video: Video, asked: Asked, every: int, progress: Progress) -> Follower | None:
     """What has followed the bob through all frames; None where every n-th frame are too few to search."""
     progress("searching", 0.0)
-    begun = _begin(video, pivot, bob, radius, localiser, start_s, stop_s, every)
+    begun = _begin(video, asked, every)
     if begun is None:
         return None
     follower, frames = begun
-    expected = _expected_frames(video, start_s, stop_s)
+    expected = _expected_frames(video, asked.start_s, asked.stop_s)
     for count, frame in enumerate(_some_at_once(frames)):
         follower.follow(frame)
         if count % 64 == 0:
@@ -172,7 +171,7 @@ def _follow(
     return follower
 
 
-def _from_release(follower: Follower, follow: Callable[..., Follower | None], bob_given: bool) -> Follower:
+def _from_release(follower: Follower, video: Video, asked: Asked, progress: Progress) -> Follower:
     """Where a hand holds or hides the bob at first, what has followed it anew from its release on: else the hand is in what was
     learned of the bob, and of what stands still. The follower itself where none does, or the bob is not found there."""
     record = follower.record
@@ -180,8 +179,9 @@ def _from_release(follower: Follower, follow: Callable[..., Follower | None], bo
     late = not_swinging_yet(Places.of(record, times - times[0]))
     if not late:
         return follower
+    bob = None if asked.bob is None else record.place[late][:2]
     try:
-        again = follow(bob=record.place[late][:2] if bob_given else None, start_s=record.t_s[late], every=1)
+        again = _follow(video, asked._replace(bob=bob, start_s=record.t_s[late]), 1, progress)
     except JobError:
         return follower
     if again is None:
@@ -191,22 +191,13 @@ def _from_release(follower: Follower, follow: Callable[..., Follower | None], bo
     return again
 
 
-def _begin(
-    video: Video,
-    pivot: tuple[float, float] | None,
-    bob: tuple[float, float] | None,
-    radius: float | None,
-    localiser: str | None,
-    start_s: float | None,
-    stop_s: float | None,
-    every: int = 1,
-) -> tuple[Follower, Iterator[Frame]] | None:
+def _begin(video: Video, asked: Asked, every: int = 1) -> tuple[Follower, Iterator[Frame]] | None:
     """A follower that knows the bob, and all frames to be followed; None where every n-th frame are too few to search.
 
     Ordinarily the search looks at the first frames, kept in memory, and the file is decoded once. With every third or ninth frame
     over a longer time the file is decoded again.
     """
-    used = _between(iter(video), start_s, stop_s)
+    used = _between(iter(video), asked.start_s, asked.stop_s)
     batch = _read_ahead(used, every)
     if every == 1:
         _require_frames(batch, video)
@@ -215,14 +206,14 @@ def _begin(
     more = int(_BYTES_ASIDE / batch[0].luma.size) if every == 1 else 0
     with ThreadPoolExecutor(1) as aside:  # other processors decode on while this one searches
         later = aside.submit(list, islice(used, more))
-        rough = find_bob(batch, bob, radius, str(video.path))
-        follower = Follower(batch, rough, pivot, radius, localiser)
+        rough = find_bob(batch, asked.bob, asked.radius, str(video.path))
+        follower = Follower(batch, rough, asked.pivot, asked.radius, asked.localiser)
     if every == 1:
         follower.first = batch
         return follower, chain(batch, later.result(), used)
     follower.interval_s /= every
     follower.exposure_s = min(follower.exposure_s, follower.interval_s)
-    return follower, _between(iter(video), start_s, stop_s)
+    return follower, _between(iter(video), asked.start_s, asked.stop_s)
 
 
 def _some_at_once(frames: Iterator[Frame], count: int = 16) -> Iterator[Frame]:
