@@ -69,6 +69,10 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
     spared = 0.0 if numbers[WEDGE] > 0.0 else -math.inf  # what lies less far along the string
     bx, by = 0.5 * numbers[STREAK_X], 0.5 * numbers[STREAK_Y]
     reach = math.sqrt(bx * bx + by * by)
+    sweep_along = sweep_aside = 0.0
+    if 2.0 * reach > radius:  # the string passes over what is above such a streak, where the bob does not hide it
+        sweep_along, sweep_aside = bx * sx + by * sy, bx * sy - by * sx
+        spared = max(radius - disc[3] - MARGIN, 0.0) if spared == 0.0 else spared
     band = disc[3] + MARGIN + 0.5 * reach * reach / radius  # a streak's ends leave the tangent
     outer, inner = radius + band + reach, radius - band - reach
     count = 0
@@ -101,8 +105,12 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
                 dx = column - cx
                 square = dx * dx + dy * dy
                 if held:
-                    along = dx * sx + dy * sy
-                    keep &= (along <= spared) | (along * along <= wedge * square)
+                    along, aside = dx * sx + dy * sy, dx * sy - dy * sx
+                    if abs(sweep_aside) > 1e-3:
+                        part_way = min(max(aside / sweep_aside, -1.0), 1.0)
+                        along -= part_way * sweep_along
+                        aside -= part_way * sweep_aside
+                    keep &= (along <= spared) | (along * along <= wedge * (along * along + aside * aside))
                 if reach > 0.0:  # across its way the streak is narrow
                     d = math.sqrt(square) + 1e-9
                     off = (d - radius) * d
