@@ -52,6 +52,13 @@ def test_bob_and_shadow_are_told_apart(shadow):
     assert found.radius_px == pytest.approx(12.0, abs=0.1)
 
 
+def test_a_faint_shadow_that_hardly_shows_beside_an_even_bob_is_found():
+    shadow = (-7.0, 5.0, 12.0, 4.0, 0.11)
+    found = find_shadow(seen(shadow, (0.05 * shadow[0], 0.05 * shadow[1])), Look(12.4, 1.2, -98.0, 3.0))
+    assert found is not None
+    assert np.hypot(found.x_px + 0.05 * shadow[0], found.y_px + 0.05 * shadow[1]) < 0.1
+
+
 def test_a_shadow_taken_for_the_lower_half_of_the_bob_is_found():
     """As dark as the bob, and wholly beside it: one large disc was fitted to both."""
     shadow = (-3.0, 20.0, 12.0, 2.5, 0.45)

@@ -16,7 +16,7 @@ _FEW = 3  # sightings: fewer tell no size on one side of the swing
 _BESIDE = 0.4  # of the radius: so far from where the bob was seen it is not
 _MANY = 4000  # pixels of a patch: a part of more tells its light as well
 # what `fit_disc` gives
-_RADIUS, _EDGE, _MISFIT, _VISIBLE, _CONTRAST, _PIXELS, _WITHIN = 2, 3, 7, 8, 9, 11, 13
+_RADIUS, _EDGE, _MISFIT, _VISIBLE, _CONTRAST, _WITHIN = 2, 3, 7, 8, 9, 13
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Looks(NamedTuple):
 
 
 class Clearest(NamedTuple):
-    """Of one sighting's fits that which left least (sum of squares beyond the noise): how little, and its centre, px."""
+    """Of one sighting's fits that which left least (misfit squared): how little, and its centre, px."""
 
     cost: float
     centre: tuple[float, float]
@@ -88,8 +88,7 @@ def learn_looks(
     slow = _slow(speed, sides)
     fast = np.argsort(-speed)[:10]
     walls = [w for w in (seen.noise(k, look) for k in slow[::2]) if np.isfinite(w)]
-    noise = float(np.median(walls or [0.0]))
-    drawn = 0.05 * abs(look.contrast) + 1.5 * noise  # more misfit than noise leaves
+    drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(walls or [0.0]))  # more misfit than noise leaves
     found_px, learned = look.radius_px, Looks(look)
     clearest: dict[int, Clearest] = {}
 
@@ -123,7 +122,7 @@ def learn_looks(
             return Looks(look._replace(radius_free=False))  # a pattern up to the outline: it tells no size, no streak
         if speed.max() * interval_s < 1.0:
             break
-        exposure_s = _exposure(seen, learned, fast, interval_s, learned.exposure_s if turn else None, noise, clearest)
+        exposure_s = _exposure(seen, learned, fast, interval_s, learned.exposure_s if turn else None, clearest)
         if exposure_s is None:
             break
         learned = learned._replace(exposure_s=exposure_s)
@@ -209,14 +208,12 @@ def _exposure(
     fast: np.ndarray,
     interval_s: float,
     about_s: float | None,
-    noise: float,
     clearest: dict[int, Clearest],
 ) -> float | None:
     """The exposure whose streak fits the fastest sightings best, looked for from `about_s` on where that is known; None where
     hardly one is fitted.
 
-    What is least is the sum of squares, less what the wall's `noise` leaves: about a longer streak there is more of the wall, which
-    is explained whatever the streak. A fit that sees no outline says nothing: a long faint streak fits an empty wall well. Each starts where the sighting's `clearest`
+    A fit that sees no outline says nothing: a long faint streak fits an empty wall well. Each starts where the sighting's `clearest`
     fit was, which becomes known here: a bob that draws a long streak was hardly found in its middle, and a fit that then fails with
     one exposure, but not with another, would say what it should not.
     """
@@ -231,7 +228,7 @@ def _exposure(
                 best_yet = clearest.get(k)
                 fit = seen.fit_from_far(k, looks[n], trials[j] * interval_s, best_yet and best_yet.centre)
                 if fit is not None and fit[_VISIBLE] > 0.5:
-                    cost[j, n] = (fit[_MISFIT] ** 2 - noise**2) * fit[_PIXELS]
+                    cost[j, n] = fit[_MISFIT] ** 2
                     if best_yet is None or cost[j, n] < best_yet.cost:
                         clearest[k] = Clearest(cost[j, n], (float(fit[0]), float(fit[1])))
         tried |= wanted

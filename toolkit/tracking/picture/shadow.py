@@ -20,7 +20,8 @@ _SHADOWY_PX = 1.2  # a sharper edge is no shadow's
 _MOVES, _STRIDE_PX = 4, 2.0  # so often each patch is moved, by so much at most
 # of the values of `_model`
 _STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3])
-_DARK = 0.04  # share of light that is missed beside the bob wherever a shadow is looked for
+# share of light that is missed beside the bob wherever a shadow is looked for: beside an even bob, and one with a pattern
+_DARK, _DARK_UNEVEN = 0.02, 0.04
 
 
 class Shadow(NamedTuple):
@@ -289,7 +290,8 @@ def _light_is_missed(
         for k in range(8)
         if (ring & (side == k)).sum() > 8
     ]
-    return len(light) >= 4 and bool(min(light) < np.median(light) - _DARK or np.median(light) < 1 - 2 * _DARK)
+    dark = _DARK if look.even else _DARK_UNEVEN
+    return len(light) >= 4 and bool(min(light) < np.median(light) - dark or np.median(light) < 1 - 2 * dark)
 
 
 def _model(values: np.ndarray, u: np.ndarray, v: np.ndarray, back: np.ndarray) -> np.ndarray:
