@@ -17,7 +17,7 @@ from toolkit.tracking.geometry.swing import CALM, fit_swing, start_swing
 from toolkit.tracking.picture.front import WITHIN, enough_shows, hidden_share
 from toolkit.tracking.picture.looks import light_on
 from toolkit.tracking.picture.passer import surroundings
-from toolkit.tracking.picture.plane import silhouette
+from toolkit.tracking.picture.plane import rim_level, silhouette
 from toolkit.tracking.picture.repeat import alike, thinned
 from toolkit.tracking.picture.spots import tell_bob
 from toolkit.tracking.picture.stillness import CameraShift
@@ -88,7 +88,7 @@ class Follower(Known):
         self.recent: deque[tuple[float, float, float]] = deque(maxlen=_STEADY if self.bold else 3)
         self._picture: Frame | None = None  # the one that is measured
         # how much of a bob with a pattern differs from what stands still: at the place judged last, and lately
-        self._unlike_seen = self._usually_unlike = np.nan
+        self._unlike_seen = self._usually_unlike = np.full(2, nan)
         self._speed = 0.0  # of the bob on it, px/s
         self._light = nan  # on the wall behind the bob lately, against that when the background was learned
         self._lit: tuple[float, Frame | None] = (nan, None)  # the bob's brightness lately, and on which picture
@@ -323,7 +323,7 @@ class Follower(Known):
             # one of two faces may be like the wall: then nearly half of the bob differs, and its outline is seen all around, unless
             # the disc fit says so, which leaves out what hides it
             around = self._outlined >= _AROUND and self.localiser.name != "disc"
-            return not self._unlike_seen < (_FACE if around else _TELLS) * self._usually_unlike
+            return not np.all(self._unlike_seen < (_FACE if around else _TELLS) * self._usually_unlike)
         shade, radius = self._shade, self.look_at(Guess(place.x_px, place.y_px)).radius_px
         if isnan(shade) or not isfinite(place.wall):
             return True
@@ -336,12 +336,17 @@ class Follower(Known):
             return True
         return told.tells > _TELLS * told.seen and told.bobs > 0.75 * told.tells
 
-    def _unlike(self, patch: Patch, place: Place) -> float:
-        """How much of a bob with a pattern differs from what stands still where it is."""
+    def _unlike(self, patch: Patch, place: Place) -> np.ndarray:
+        """How much of a bob with a pattern differs from what stands still where it is: differs much, and differs clearly."""
         radius = self.look.radius_px
-        behind = _back_at(patch, place, radius, WITHIN) * light_on(patch)
+        light = light_on(patch)
+        behind = _back_at(patch, place, radius, WITHIN) * light
         shown = _back_at(patch._replace(back=patch.image), place, radius, WITHIN)
-        return float(np.mean(np.abs(shown - behind) > 0.2 * abs(self.look.contrast) + 4)) if behind.size else nan
+        # a face of nearly the wall's brightness differs clearly from what is there without it, if little else beside it does
+        clear = max(4.0, 4 * rim_level(np.abs(patch.image - light * patch.back)))
+        much = 0.2 * abs(self.look.contrast) + 4
+        off = np.abs(shown - behind)
+        return np.array([np.mean(off > much), np.mean(off > min(clear, much))]) if behind.size else np.full(2, nan)
 
     def _remember(self, t_s: float, place: Place) -> None:
         """What the next frames are judged by."""
@@ -349,7 +354,7 @@ class Follower(Known):
         self.recent.append((t_s, place.x_px, place.y_px))
         if not self.look.even:  # a bob with a pattern has no one brightness
             share = self._unlike_seen
-            self._usually_unlike = share if isnan(self._usually_unlike) else 0.9 * self._usually_unlike + 0.1 * share
+            self._usually_unlike = share if isnan(self._usually_unlike[0]) else 0.9 * self._usually_unlike + 0.1 * share
         if isnan(place.wall) or not self.look.even:
             return
         shade = self._shade_seen
