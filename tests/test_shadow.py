@@ -176,17 +176,26 @@ def patterned(x, y, turned, wall, shadow, rng):
 
 
 def test_a_shadow_is_not_followed_in_place_of_a_bob_with_a_pattern(tmp_path):
-    rng = np.random.default_rng(3)
     t_s = np.arange(120) / 60
     theta = angles(t_s)
     x, y = PIVOT[0] + LENGTH * np.sin(theta), PIVOT[1] + LENGTH * np.cos(theta)
     wall = np.full((H, W), 165.0)
     shadow = (-16.0, 18.0, 12.0, 2.2, 0.42)
-    frames = [patterned(a, b, 5 * t, wall, shadow, rng) for a, b, t in zip(x, y, t_s)]
-    found = track(film(tmp_path / "pattern.mp4", [np.clip(f, 0, 255).astype(np.uint8) for f in frames]))
-    assert (found.status == OK).mean() > 0.95
-    # half of the outline does not show at all; the shadow is 24 px away
-    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 8.0
+    typical, shares = [], []
+    for seed in (
+        3,
+        4,
+        5,
+    ):  # half of the outline does not show at all: with another noise the bob is found better or worse
+        rng = np.random.default_rng(seed)
+        frames = [patterned(a, b, 5 * t, wall, shadow, rng) for a, b, t in zip(x, y, t_s)]
+        found = track(film(tmp_path / f"pattern{seed}.mp4", [np.clip(f, 0, 255).astype(np.uint8) for f in frames]))
+        off = np.hypot(found.x_px - x, found.y_px - y)[found.ok]
+        assert off.max() < 0.5 * np.hypot(*shadow[:2])  # nearer to the bob than to its shadow
+        typical.append(np.median(off))
+        shares.append(found.ok.mean())
+    assert np.median(typical) < 1.5
+    assert np.mean(shares) > 0.9
 
 
 def test_the_bob_is_found_beside_the_shadow_that_was_taken_for_it():
