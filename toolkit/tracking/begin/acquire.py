@@ -35,7 +35,8 @@ def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float 
     candidates, samples = _hypotheses(batch, bob, radius, colour=False)
     moved = bool(candidates)
     best = _likeliest(batch, candidates, samples, radius, repeated)
-    if best is None or len(best.points) < _MOST * (len(batch) - len(repeated)) or not is_even(best.look):
+    most = _MOST * (len(batch) - len(repeated))
+    if not _is_clear(best, most):
         still = still_picture([batch[i].luma for i in scattered(len(batch))])
         movers = [c for c in _movers_before(batch, still, samples, radius) if bob is None]
         moved = moved or bool(movers)
@@ -43,10 +44,12 @@ def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float 
             other = _likeliest(batch, extra, samples, radius, repeated, Stage(still, alike))
             if other is not None and (best is None or _weight(batch, other, still) > _weight(batch, best, still)):
                 best = other
-    if best is None:
+    if not _is_clear(best, most):  # of a bob as bright as the wall brightness shows the string's end
         candidates, samples = _hypotheses(batch, bob, radius, colour=True)
         moved = moved or bool(candidates)
-        best = _likeliest(batch, candidates, samples, radius, repeated)
+        other = _likeliest(batch, candidates, samples, radius, repeated)
+        if other is not None and (best is None or (_is_clear(other, most) and other.score > best.score)):
+            best = other
     if best is not None:
         return _in_best_sight(batch, best, radius, repeated)
     if not moved:
@@ -111,6 +114,11 @@ def _weight(batch: list[Frame], rough: Rough, still: np.ndarray) -> float:
         inside = np.hypot(*np.ogrid[-(y - y0) : rows - (y - y0) - 0.5, -(x - x0) : columns - (x - x0) - 0.5]) < radius
         shares.append(differs[inside].sum() / (differs[~inside].sum() + inside.sum()))
     return rough.score * float(np.median(shares)) ** 2 if shares else 0.0
+
+
+def _is_clear(found: Rough | None, most: float) -> bool:
+    """Was a bob of one shade found on so many frames?"""
+    return found is not None and len(found.points) >= most and is_even(found.look)
 
 
 def is_even(look: Look) -> bool:
