@@ -48,7 +48,7 @@ def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float 
         candidates, samples = _hypotheses(batch, bob, radius, colour=True)
         moved = moved or bool(candidates)
         other = _likeliest(batch, candidates, samples, radius, repeated)
-        if other is not None and (best is None or (_is_clear(other, most) and other.score > best.score)):
+        if other is not None and (best is None or (_is_clear(other, most) and _is_another(best, other))):
             best = other
     if best is not None:
         return _in_best_sight(batch, best, radius, repeated)
@@ -119,6 +119,14 @@ def _weight(batch: list[Frame], rough: Rough, still: np.ndarray) -> float:
 def _is_clear(found: Rough | None, most: float) -> bool:
     """Was a bob of one shade found on so many frames?"""
     return found is not None and len(found.points) >= most and is_even(found.look)
+
+
+def _is_another(one: Rough, other: Rough) -> bool:
+    """Is the other something else, and does it swing better?"""
+    common = one.points.keys() & other.points.keys()
+    apart = [np.hypot(*np.subtract(one.points[i], other.points[i])) for i in common]
+    same = apart and float(np.median(apart)) < 0.5 * other.look.radius_px
+    return other.score > one.score and not same
 
 
 def is_even(look: Look) -> bool:
