@@ -20,10 +20,8 @@ from toolkit.tracking.picture.looks import Looks, Sightings, light_on
 
 _EDGES = 0.4, 0.6, 0.9, 1.3, 1.9, 2.8  # px, each half as much again
 _PARTS = np.linspace(0, 1, 11)  # of the time from one frame to the next
-_LONGEST, _SHORTEST = (
-    24.0,
-    4.0,
-)  # px: ways in a frame's time that tell the exposure; a shorter streak is like a softer edge
+# px: ways in a frame's time that tell the exposure; a shorter streak is like a softer edge
+_LONGEST, _SHORTEST = 24.0, 4.0
 _MANY = 32  # sightings that are looked at,
 _FEW = 10  # by which edge and exposure are told
 _MOST = 0.6  # of them

@@ -163,20 +163,21 @@ def _names(shown: tuple[str, ...]) -> tuple[str, ...]:
 
 def _turned(values: np.ndarray) -> list[np.ndarray]:
     """The same seen from four sides: mirrored views are minima of their own."""
-    turned = []
-    for tilt in _TILTS:
-        turned.append(values.copy())
-        turned[-1][[AT["yaw"], AT["pitch"]]] = tilt
-    return turned
+    return _each_with(values, ("yaw", "pitch"), _TILTS)
 
 
 def _swayed(values: np.ndarray) -> list[np.ndarray]:
     """The same in a plane that is turned one way or the other, or in an ellipse that is run through either way round."""
-    swayed = []
-    for sway in _SWAYS:
-        swayed.append(values.copy())
-        swayed[-1][[AT["sway_sin"], AT["sway_cos"]]] = sway
-    return swayed
+    return _each_with(values, ("sway_sin", "sway_cos"), _SWAYS)
+
+
+def _each_with(values: np.ndarray, names: tuple[str, str], pairs: tuple[tuple[float, float], ...]) -> list[np.ndarray]:
+    """Copies of the values, one with each of the pairs for these two."""
+    copies = []
+    for pair in pairs:
+        copies.append(values.copy())
+        copies[-1][[AT[name] for name in names]] = pair
+    return copies
 
 
 def _spread(least: Minimum, names: tuple[str, ...]) -> np.ndarray:
