@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_track import LENGTH, PIVOT, RADIUS, H, W, angles, film
@@ -122,6 +124,9 @@ def test_what_goes_beside_another_fainter_and_softer_is_its_shadow(off, look, sh
     other = Rough(look, swing, dict(enumerate(zip(u, v))), 70.0, Sight())
     assert _is_shadow_of(other, bob) is shadows
     assert not _is_shadow_of(bob, other)
+    lost = {i: (a + 40, b) if i in (20, 21, 22, 50, 51) else (a, b) for i, (a, b) in bob.points.items()}
+    astray = replace(bob, points=lost, score=1.0)  # behind a post something else is taken for the bob
+    assert _is_shadow_of(other, astray) is shadows
 
 
 def test_a_post_beside_the_bob_does_not_make_its_brightness_useless():

@@ -17,7 +17,7 @@ from toolkit.output import whole_file
 from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
-from toolkit.tracking.begin.acquire import REMEDY, find_bob
+from toolkit.tracking.begin.acquire import REMEDY, find_bob, find_clear_bob
 from toolkit.tracking.clip.bars import ErrorBars
 from toolkit.tracking.clip.clock import (
     even_times,
@@ -34,6 +34,7 @@ from toolkit.tracking.clip.joint import Camera, fit_jointly
 from toolkit.tracking.clip.outline import pulled_by_string
 from toolkit.tracking.clip.places import Places
 from toolkit.tracking.clip.shake import Shake
+from toolkit.tracking.clip.soundness import apart_told, faults, is_sound
 from toolkit.tracking.clip.verdict import poor_motion, poor_picture, require_pendulum
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.geometry.swing import Swing
@@ -44,10 +45,10 @@ from toolkit.video import Frame, Video, clock_warnings, open_video
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
 
 # of luma: what is decoded while the bob is searched for; each new frame costs memory, which takes time too
-_BYTES_ASIDE = 1e7
+_BYTES_ASIDE = 2e7
 
-# which of the frames are searched, one after the other: a slow swing, slow motion, a hand that holds the bob need a longer time
-_EVERY = (1, 3, 9)
+_BRIEF_S, _THOROUGH_S = 0.8, 1.6  # of the film: what is searched
+_BRIEF_FRAMES = 45  # fewer teach too little of the bob's looks
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
 
 
@@ -116,16 +117,30 @@ def track(
     if localiser is not None:
         load_tracker(localiser)
     video = open_video(video_path, filtered=False)
+    if bob is not None and not (0 <= bob[0] < video.width_px and 0 <= bob[1] < video.height_px):
+        wide, high = video.width_px, video.height_px
+        raise UsageError(f"bob ({bob[0]:g}, {bob[1]:g}) lies outside the picture of {wide}×{high} px")
     asked = Asked(pivot, bob, radius, localiser, start_s, stop_s)
     refusal: JobError | None = None
-    for every in _EVERY:
+    doubtful: Track | None = None
+    for look in _looks(video):
+        if doubtful is not None and look.every > 1:
+            break
         try:
-            follower = _follow(video, asked, every, progress)
+            follower = _follow(video, asked, look, progress)
             if follower is None:
-                break
-            return _finish(video, _from_release(follower, video, asked, progress), pivot, fps_factor)
+                continue
+            found = _finish(video, _from_release(follower, video, asked, progress), pivot, fps_factor)
         except JobError as error:
-            refusal = refusal or error
+            refusal = refusal or (None if look.brief else error)
+            continue
+        if not look.brief:
+            return found if doubtful is None else _sounder(found, doubtful)
+        if is_sound(found.ok, found.meta["warnings"]):
+            return found
+        doubtful = found
+    if doubtful is not None:
+        return doubtful
     raise refusal  # type: ignore[misc]
 
 
@@ -144,6 +159,22 @@ def write_track_csv(track: Track, path: str | Path) -> None:
 # --- the pieces ---------------------------------------------------------------------------------------------------
 
 
+class Look(NamedTuple):
+    """How the bob is searched: on every n-th of the frames of so much time; `brief`, it must be clear there."""
+
+    every: int
+    most_s: float
+    brief: bool = False
+
+
+def _looks(video: Video) -> list[Look]:
+    """The searches, one after the other: a brief one does for most clips, and a slow swing, slow motion, a hand that holds the bob
+    need a longer time."""
+    longer = [Look(every, every * _THOROUGH_S) for every in (1, 3, 9)]
+    enough = (video.fps_header or 0.0) * _BRIEF_S >= _BRIEF_FRAMES
+    return [Look(1, _BRIEF_S, brief=True), *longer] if enough else longer
+
+
 class Asked(NamedTuple):
     """What the caller of `track` said of the clip; None where nothing."""
 
@@ -155,10 +186,10 @@ class Asked(NamedTuple):
     stop_s: float | None = None
 
 
-def _follow(video: Video, asked: Asked, every: int, progress: Progress) -> Follower | None:
-    """What has followed the bob through all frames; None where every n-th frame are too few to search."""
+def _follow(video: Video, asked: Asked, look: Look, progress: Progress) -> Follower | None:
+    """What has followed the bob through all frames; None where the look shows too few frames, or no clear bob to a brief one."""
     progress("searching", 0.0)
-    begun = _begin(video, asked, every)
+    begun = _begin(video, asked, look)
     if begun is None:
         return None
     follower, frames = begun
@@ -171,6 +202,14 @@ def _follow(video: Video, asked: Asked, every: int, progress: Progress) -> Follo
     return follower
 
 
+def _sounder(one: Track, other: Track) -> Track:
+    """The better of two tracks of a clip; it warns where the other has the bob elsewhere."""
+    best = min(one, other, key=lambda track: faults(track.ok, track.meta["warnings"]))
+    both = one.ok & other.ok
+    places = (np.array([track.x_px[both], track.y_px[both]]) for track in (one, other))
+    return replace(best, meta={**best.meta, "warnings": [*best.meta["warnings"], *apart_told(*places)]})
+
+
 def _from_release(follower: Follower, video: Video, asked: Asked, progress: Progress) -> Follower:
     """Where a hand holds or hides the bob at first, what has followed it anew from its release on: else the hand is in what was
     learned of the bob, and of what stands still. The follower itself where none does, or the bob is not found there."""
@@ -181,7 +220,7 @@ def _from_release(follower: Follower, video: Video, asked: Asked, progress: Prog
         return follower
     bob = None if asked.bob is None else record.place[late][:2]
     try:
-        again = _follow(video, asked._replace(bob=bob, start_s=record.t_s[late]), 1, progress)
+        again = _follow(video, asked._replace(bob=bob, start_s=record.t_s[late]), Look(1, _THOROUGH_S), progress)
     except JobError:
         return follower
     if again is None:
@@ -191,27 +230,34 @@ def _from_release(follower: Follower, video: Video, asked: Asked, progress: Prog
     return again
 
 
-def _begin(video: Video, asked: Asked, every: int = 1) -> tuple[Follower, Iterator[Frame]] | None:
-    """A follower that knows the bob, and all frames to be followed; None where every n-th frame are too few to search.
+def _begin(video: Video, asked: Asked, look: Look) -> tuple[Follower, Iterator[Frame]] | None:
+    """A follower that knows the bob, and all frames to be followed; None where the look shows too few frames, or no clear bob to a
+    brief one.
 
     Ordinarily the search looks at the first frames, kept in memory, and the file is decoded once. With every third or ninth frame
     over a longer time the file is decoded again.
     """
     used = _between(iter(video), asked.start_s, asked.stop_s)
-    batch = _read_ahead(used, every)
-    if every == 1:
+    batch = _read_ahead(used, look)
+    if look.every == 1:
         _require_frames(batch, video)
     elif len(batch) < 12:
         return None
-    more = int(_BYTES_ASIDE / batch[0].luma.size) if every == 1 else 0
+    more = int(_BYTES_ASIDE / batch[0].luma.size) if look.every == 1 else 0
     with ThreadPoolExecutor(1) as aside:  # other processors decode on while this one searches
         later = aside.submit(list, islice(used, more))
-        rough = find_bob(batch, asked.bob, asked.radius, str(video.path))
+        rough = (
+            find_clear_bob(batch, asked.bob, asked.radius)
+            if look.brief
+            else find_bob(batch, asked.bob, asked.radius, str(video.path))
+        )
+        if rough is None:
+            return None
         follower = Follower(batch, rough, asked.pivot, asked.radius, asked.localiser)
-    if every == 1:
+    if look.every == 1:
         follower.first = batch
         return follower, chain(batch, later.result(), used)
-    follower.interval_s /= every
+    follower.interval_s /= look.every
     follower.exposure_s = min(follower.exposure_s, follower.interval_s)
     return follower, _between(iter(video), asked.start_s, asked.stop_s)
 
@@ -245,16 +291,16 @@ def _expected_frames(video: Video, start_s: float | None, stop_s: float | None) 
     return max(1, int((stop - (start_s or 0.0)) * (video.fps_header or 30.0))) if stop < 1e9 else 1000
 
 
-def _read_ahead(frames: Iterator[Frame], every: int = 1, most_s: float = 1.6, most_bytes: float = 2.2e8) -> list[Frame]:
+def _read_ahead(frames: Iterator[Frame], look: Look, most_bytes: float = 2.2e8) -> list[Frame]:
     """The first frames (or every n-th of them), kept in memory for the search."""
     batch: list[Frame] = []
     size = 0.0
     for count, frame in enumerate(frames):
-        if count % every:
+        if count % look.every:
             continue
         batch.append(frame)
         size += 1.5 * frame.luma.size
-        if len(batch) >= 24 and (size > most_bytes or frame.t_s - batch[0].t_s > most_s * every):
+        if len(batch) >= 24 and (size > most_bytes or frame.t_s - batch[0].t_s > look.most_s):
             break
     return batch
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.errors import JobError, UsageError
+from toolkit.errors import JobError
 from toolkit.trackers.localiser import Look
 from toolkit.tracking.begin.search import Hypothesis, find_round_movers
 from toolkit.tracking.begin.trail import Rough, Stage, Trail, begin_trail, cut
@@ -19,8 +19,33 @@ from toolkit.video import Frame
 
 _FOLLOWED = 8  # hypotheses at most
 _MOST = 0.9  # of the frames: a bob seen on fewer is looked for in other ways too
-_SHADOWED = 0.3  # of its shadow's score a bob has at least
+_ALL = 0.97  # of few frames
+_SWUNG = 0.4  # of a period: in so much of it a bob turns, or passes its lowest point, or both
+_CALM = 0.15  # of the radius: what strays farther from a swing is lost now and then, or the camera shakes
+_SHADOWED = 0.3  # of its shadow's clearness a bob has at least
+_MOSTLY = 0.7  # of the frames a shadow goes with its bob
 REMEDY = "give --bob X,Y (its centre in px on the first frame)"
+
+
+def find_clear_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float | None) -> Rough | None:
+    """A bob of one shade that is seen on all of few frames, and of whose swing they show enough to know it; None where nothing is so
+    clear."""
+    repeated = repeats(batch)
+    candidates, samples = _hypotheses(batch, bob, radius, colour=False)
+    best = _likeliest(batch, candidates, samples, radius, repeated)
+    if best is None or not _is_clear(best, _ALL * (len(batch) - len(repeated))):
+        return None
+    swing, size_px = best.swing, best.look.radius_px
+    span_s = batch[-1].t_s - batch[0].t_s
+    extent_px = np.hypot(*np.ptp(list(best.points.values()), axis=0))
+    if (
+        swing.values[4] <= 0
+        or span_s < _SWUNG * swing.period_s
+        or extent_px < 2 * size_px
+        or swing.rms_px > _CALM * size_px
+    ):
+        return None
+    return _in_best_sight(batch, best, radius, repeated)
 
 
 def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float | None, what: str) -> Rough:
@@ -28,9 +53,6 @@ def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float 
 
     Raises JobError where there is none, naming the file by `what`.
     """
-    height, width = batch[0].luma.shape
-    if bob is not None and not (0 <= bob[0] < width and 0 <= bob[1] < height):
-        raise UsageError(f"bob ({bob[0]:g}, {bob[1]:g}) lies outside the picture of {width}×{height} px")
     repeated = repeats(batch)
     candidates, samples = _hypotheses(batch, bob, radius, colour=False)
     moved = bool(candidates)
@@ -89,14 +111,16 @@ def _likeliest(
 
 
 def _is_shadow_of(one: Rough, other: Rough) -> bool:
-    """Does it go with the other, beside it, fainter and softer?"""
+    """Does it go with the other, beside it, fainter and softer? The other may have been lost on some frames."""
     common = sorted(one.points.keys() & other.points.keys())
-    if len(common) < 0.7 * len(one.points) or not other.score > _SHADOWED * one.score:
+    if len(common) < _MOSTLY * len(one.points) or not other.clearness > _SHADOWED * one.clearness:
         return False
     off = np.array([np.subtract(one.points[i], other.points[i]) for i in common])
-    beside = np.hypot(*off.mean(axis=0)) > max(one.look.radius_px, other.look.radius_px)
+    usual = np.median(off, axis=0)
+    beside = np.hypot(*usual) > max(one.look.radius_px, other.look.radius_px)
     fainter = abs(one.look.contrast) < 0.8 * abs(other.look.contrast) and one.look.edge_px > other.look.edge_px
-    return bool(beside and fainter and np.hypot(*off.std(axis=0)) < 0.2 * other.look.radius_px)
+    together = np.hypot(*(off - usual).T) < 0.4 * other.look.radius_px
+    return bool(beside and fainter and np.mean(together) > _MOSTLY)
 
 
 def _weight(batch: list[Frame], rough: Rough, still: np.ndarray) -> float:

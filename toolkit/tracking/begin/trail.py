@@ -27,6 +27,11 @@ class Rough:
     score: float
     sight: Sight
 
+    @property
+    def clearness(self) -> float:
+        """The score that its looks alone would give."""
+        return _score(self.look, 0.0)
+
 
 class Stage(NamedTuple):
     """The still picture that hypotheses are followed before; with `silhouette` all that differs from it looks alike."""

@@ -1,0 +1,79 @@
+"""A brief look at the film first; a thorough one where its track is not sound, and then the sounder of the two."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_track import LENGTH, PIVOT, angles, draw, film, swing_clip
+
+from toolkit.errors import UsageError
+from toolkit.sentence import said
+from toolkit.track import Asked, _begin, _looks, _sounder, track
+from toolkit.tracking.clip.soundness import faults, is_sound
+from toolkit.video import open_video
+
+pytest.importorskip("av")
+
+STRAYS = said("track.strays", "it strays")
+HARMLESS = said("track.clock_slips", "the clock slips")
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    path = tmp_path_factory.mktemp("look") / "swing.mp4"
+    return path, swing_clip(path)
+
+
+def test_a_track_is_sound_if_it_has_nearly_all_frames_and_no_warning_of_its_places():
+    frames = np.arange(100)
+    assert is_sound(frames < 95, [HARMLESS])
+    assert not is_sound(frames < 85, [])
+    assert not is_sound(frames < 100, [STRAYS])
+    assert faults(frames < 70, []) > faults(frames < 100, [STRAYS])
+
+
+def test_a_brief_look_is_for_films_that_show_enough_in_it():
+    looks = {fps: _looks(SimpleNamespace(fps_header=fps)) for fps in (None, 30.0, 59.94, 240.0)}
+    assert [look.brief for look in looks[59.94]] == [True, False, False, False]
+    assert looks[240.0] == looks[59.94]
+    assert looks[None] == looks[30.0] == looks[59.94][1:]
+
+
+def test_a_clear_bob_needs_no_thorough_look(clip):
+    path, (_, _, x, y) = clip
+    brief, thorough = _looks(open_video(path))[:2]
+    follower, _ = _begin(open_video(path), Asked(), brief)
+    other, _ = _begin(open_video(path), Asked(), thorough)
+    assert len(follower.first) < 0.6 * len(other.first)
+    found = track(path)
+    assert np.hypot(found.x_px - x, found.y_px - y).max() < 0.2
+
+
+def test_a_bob_that_hardly_moves_yet_gets_a_thorough_look(tmp_path):
+    t = np.arange(240) / 60.0
+    swung = np.concatenate([np.full(45, 0.3), angles(t[:-45])])
+    x, y = PIVOT[0] + LENGTH * np.sin(swung), PIVOT[1] + LENGTH * np.cos(swung)
+    rng = np.random.default_rng(1)
+    path = film(tmp_path / "late.mp4", (draw(a, b, rng) for a, b in zip(x, y)))
+    brief = _looks(open_video(path))[0]
+    assert _begin(open_video(path), Asked(), brief) is None
+    found = track(path)
+    assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
+
+
+def test_of_two_tracks_the_sounder_is_kept_and_that_they_differ_is_said(clip):
+    one = track(clip[0])
+    lame = replace(one, x_px=one.x_px + 7.0, meta={**one.meta, "warnings": [STRAYS]})
+    for kept in (_sounder(one, lame), _sounder(lame, one)):
+        assert np.array_equal(kept.x_px, one.x_px)
+        (warning,) = kept.meta["warnings"]
+        assert "7.0 px apart" in warning
+    assert _sounder(one, replace(lame, x_px=one.x_px)).meta["warnings"] == []
+
+
+def test_a_bob_said_to_be_outside_the_picture_is_misuse(clip):
+    with pytest.raises(UsageError, match="outside the picture"):
+        track(clip[0], bob=(-3.0, 20.0))
