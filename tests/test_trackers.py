@@ -317,3 +317,20 @@ def test_the_misfit_tells_what_the_localisers_idea_of_the_bob_leaves(name):
         assert place.misfit < 2 * NOISE
     else:
         assert not place.misfit < 3 * NOISE  # or nothing was found
+
+
+@pytest.mark.parametrize(
+    ("streak", "bend"), [((30.0, 0.0), (0.0, -2.5)), ((20.0, 12.0), (3.0, 2.0)), ((0.0, 0.0), (2.0, 0.0))]
+)
+def test_a_streak_that_the_string_and_gravity_bend_is_found_in_the_middle_of_its_light(streak, bend):
+    """Without noise, of a disc averaged over many instants of a parabola. By a straight streak it is 0.3 px off where both its sides are hidden."""
+    instants = (np.arange(200) + 0.5) / 200 - 0.5
+    ways = [(u * streak[0] + u * u * bend[0], u * streak[1] + u * u * bend[1]) for u in instants]
+    centre = np.array([48.3, 47.6])
+    image = np.mean([blurred_disc(*(centre + way), 0.9, size=96) for way in ways], axis=0)
+    middle = centre + np.mean(ways, axis=0)
+    look = Look(RADIUS, 0.9, BOB - WALL, 0.5)
+    guess = Guess(centre[0] + 300, centre[1] + 500, *streak, bend_x_px=bend[0], bend_y_px=bend[1])
+    for string_rad, faces in ((np.nan, False), (-np.pi / 2, False), (-np.pi / 2, True)):
+        place = load_tracker("disc").locate(patch_of(image), look, guess._replace(string_rad=string_rad, faces=faces))
+        np.testing.assert_allclose((place.x_px - 300, place.y_px - 500), middle, atol=0.03)

@@ -53,6 +53,23 @@ def test_a_motion_that_no_frames_could_tell_is_no_number_and_takes_no_time():
     assert np.isfinite(hour).all()
 
 
+def test_a_swing_knows_its_acceleration_and_the_mean_place_over_an_exposure():
+    swing = Swing(np.array([400.0, 20, 500, 0.02, 39, 0, 0, 1.1, 0.4]), np.zeros((9, 9)), 0.0, 0.0)
+    t, exposure_s = np.linspace(0, 1.5, 20), 0.015
+    instants = exposure_s * ((np.arange(400) + 0.5) / 400 - 0.5)
+    mean = np.array([[p.mean() for p in swing.position(s + instants)] for s in t]).T
+    off = swing.over_exposure(t, exposure_s)
+    np.testing.assert_allclose(np.array(swing.position(t)) + off, mean, atol=2e-3)
+    assert np.hypot(*off).max() > 0.1
+    step = 1e-3
+    back, at, forth = (np.array(swing.position(t + k * step)) for k in (-1, 0, 1))
+    told = [
+        swing.acceleration_at(*place, *speed)
+        for place, speed in zip(at.T, np.transpose(swing.velocity(t)), strict=True)
+    ]
+    np.testing.assert_allclose(np.transpose(told), (forth - 2 * at + back) / step**2, atol=30.0)  # of 20 000 px/s²
+
+
 def test_more_motions_than_are_integrated_side_by_side_and_a_few_times():
     rng = np.random.default_rng(7)
     motions = np.array([0, 0, 500, 0, 18, 0.05, 0.1, 2.9, 0.3]) * rng.uniform(0.9, 1.1, (11, 9))

@@ -187,8 +187,10 @@ def _measured(track: Track) -> tuple[np.ndarray, ...]:
     if kept.size < 8:
         raise JobError(f"only {kept.size} frames were measured; an angle needs at least 8")
     zero = np.zeros(track.t_s.size)
-    x = (track.x_px - np.asarray(track.meta.get("shift_x_px", zero)))[kept]
-    y = (track.y_px - np.asarray(track.meta.get("shift_y_px", zero)))[kept]
+    off_x, off_y = (
+        sum(np.asarray(track.meta.get(f"{what}_{axis}_px", zero)) for what in ("shift", "mean")) for axis in "xy"
+    )
+    x, y = (track.x_px - off_x)[kept], (track.y_px - off_y)[kept]
     t = track.t_s[kept]
     shake = np.asarray(track.meta.get("shift_sigma_px", zero))
     rising = np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])

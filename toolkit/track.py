@@ -356,7 +356,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     good = places.good
     off_px = misfit * look.radius_px / 3
     strings = _strings(record, places, shake, look.radius_px, fps_factor)
-    camera = Camera(size_px, pivot, turned, max(0.02, off_px), fps_factor, look.even, follower.shadow is not None)
+    shaded, exposure_s = follower.shadow is not None, follower.exposure_s
+    camera = Camera(size_px, pivot, turned, max(0.02, off_px), fps_factor, look.even, shaded, exposure_s)
     lines = strings.seen()
     joint = fit_jointly(places, swing, shake, time_sigma, lines, camera)
     # with tilt, lens and shutter taken out some are no strays, and others hid in these
@@ -388,6 +389,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     x, y = (np.where(bridged, m, p) for m, p in ((joint.x_px, places.x_px), (joint.y_px, places.y_px)))
     spread = max(float(np.hypot(np.std(rx), np.std(ry))), 0.02)
     steps = np.diff(places.t_s)
+    mean_x, mean_y = swing.over_exposure(places.t_s, exposure_s)
     if follower.choice:
         log.append(follower.choice)
     log += _how_followed(follower, good, bridged, joint.bars, fps_factor)
@@ -420,6 +422,8 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
             "view": joint.view,
             "swing": swing.values_at(places.t_s[good][0], fps_factor).tolist(),
             "pivot_given": pivot is not None,
+            "mean_x_px": mean_x,
+            "mean_y_px": mean_y,
             "shift_x_px": shake.x,
             "shift_y_px": shake.y,
             "shift_sigma_px": np.hypot(shake.sigma, joint.bars.shake_px),

@@ -30,7 +30,7 @@ _P = 8  # parameters: cx, cy, three of the shade, gain, R, h
 CHUNK = 128
 
 # The caller's numbers: what is known, then the result from OUT on.
-CX, CY, RADIUS, EDGE, STREAK_X, STREAK_Y, STRING_X, STRING_Y, WEDGE, NOISE, CONTRAST, OUT = range(12)
+CX, CY, RADIUS, EDGE, STREAK_X, STREAK_Y, BEND_X, BEND_Y, STRING_X, STRING_Y, WEDGE, NOISE, CONTRAST, OUT = range(14)
 RESULTS = 14
 # The caller's places: addresses of the three pictures, of the numbers and of the room to work in, then whole numbers:
 # size, elements from one row to the next, FREE parameters, whether to look INSIDE, most TURNS, MOST pixels.
@@ -73,7 +73,9 @@ def gather(places: Any, numbers: Any, lists: Any, disc: Any) -> int:
     if 2.0 * reach > radius:  # the string passes over what is above such a streak, where the bob does not hide it
         sweep_along, sweep_aside = bx * sx + by * sy, bx * sy - by * sx
         spared = max(radius - disc[3] - MARGIN, 0.0) if spared == 0.0 else spared
-    band = disc[3] + MARGIN + 0.5 * reach * reach / radius  # a streak's ends leave the tangent
+    qx, qy = numbers[BEND_X], numbers[BEND_Y]
+    # a streak's ends leave the tangent, and where a straight one's would be
+    band = disc[3] + MARGIN + 0.5 * reach * reach / radius + math.sqrt(qx * qx + qy * qy) / 6.0
     outer, inner = radius + band + reach, radius - band - reach
     count = 0
     for row in range(places[ROWS]):
@@ -386,12 +388,12 @@ def fit(places: Any) -> None:
     """Fit the disc; out[0] stays NaN where it did not settle: singular normal equations, the centre left the patch, or the
     steps did not become small.
 
-    numbers : cx, cy, R, s; streak; string (see `gather`); noise; contrast (bob less wall, 0 if unknown).
+    numbers : cx, cy, R, s; streak; bend; string (see `gather`); noise; contrast (bob less wall, 0 if unknown).
     FREE : 6 (centre, shading, gain), 7 (and R) or 8 (and s).
     out : cx, cy, R, s, var_x, var_y, cov_xy, misfit, visible, contrast, gain, pixels, wall, misfit well inside.
 
     Along a streak the depth of each pixel is taken as linear in each of a few pieces, lifted by the mean of how far its
-    curve is above them.
+    curve is above them. The centre found is the mean of a bent streak.
     """
     numbers, lists = reals(places, NUMBERS), reals(places, ROOM)
     out, most, free = skip(numbers, OUT), places[MOST], places[FREE]
@@ -402,6 +404,7 @@ def fit(places: Any) -> None:
     normal, right, step = skip(work, _NORMAL), skip(work, _RIGHT), skip(work, _STEP)
     disc, listed, shade = skip(work, _DISC), skip(work, _LISTED), skip(work, _SHADE)
     bx, by, noise, contrast = numbers[STREAK_X], numbers[STREAK_Y], numbers[NOISE], numbers[CONTRAST]
+    qx, qy = numbers[BEND_X], numbers[BEND_Y]
     for k in range(4):
         disc[k] = numbers[CX + k]
         listed[k] = math.inf
@@ -411,6 +414,7 @@ def fit(places: Any) -> None:
     length = math.sqrt(bx * bx + by * by)
     pieces = int(length / math.sqrt(disc[2] + 1.0)) + 1
     pieces = pieces if pieces < 16 else 16
+    among = 1.0 / 12.0 + 1.0 / (6.0 * pieces * pieces)  # the mean of u² along the pieces
     first = 0 if contrast != 0.0 else 1  # the first turn on which the centre moves
     cut, clean, count, level, damp, settled = math.inf, 0.0, 0, 0.0, 1.0, False
     last_x = last_y = 0.0
@@ -446,7 +450,9 @@ def fit(places: Any) -> None:
                     share[i] = rise[i] = widen[i] = before[i] = edge[i] = whole[i] = aside[i] = closer[i] = 0.0
                 for k in range(pieces + 1):
                     u = k / pieces - 0.5
-                    measure_depth(x, y, n, cx + u * bx, cy + u * by, radius, soft, depth, near)
+                    bent = u * u - among
+                    ax, ay = cx + u * bx + bent * qx, cy + u * by + bent * qy
+                    measure_depth(x, y, n, ax, ay, radius, soft, depth, near)
                     part = 1.0 / pieces if k > 0 else 0.0
                     cover_moving(
                         depth, near, lift, n, part, soft, before, edge, whole, closer, share, rise, widen, aside

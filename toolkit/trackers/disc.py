@@ -3,7 +3,8 @@ background that the clip has shown, on a ring of pixels about the outline and, w
 of those within it (they tell the shade, which the outline alone confuses with the place).
 
 Model of a pixel: g·back·(1 − α) + (f0 + fx·dx/R + fy·dy/R)·α, with α the mean over the streak of the edge function
-E((R − d)/h). E is the integral of a compact kernel very near to the normal distribution's: no exponential to evaluate.
+E((R − d)/h). The streak is a parabola: string and gravity bend the bob's way. E is the integral of a compact kernel very
+near to the normal distribution's: no exponential to evaluate.
 Gauss–Newton over (cx, cy, f0, fx, fy, g) and, when calibrating, (R, h); pixels far off the model do not count.
 """
 
@@ -46,7 +47,7 @@ def locate(patch: Patch, look: Look, guess: Guess) -> Place:
     return Place(cx + patch.x_px, cy + patch.y_px, sqrt(xx), sqrt(yy), misfit, visible, contrast, gain * wall, light)
 
 
-_GIVEN, _FOUND, _PLACES = Struct("11d"), Struct("14d"), Struct("15q")  # what the kernel takes and gives, and its places
+_GIVEN, _FOUND, _PLACES = Struct("13d"), Struct("14d"), Struct("15q")  # what the kernel takes and gives, and its places
 _SPARE = 4096  # numbers that it needs beside its seven lists of pixels, and more
 _SINGLE = np.dtype(np.float32)
 
@@ -99,7 +100,7 @@ def _fit(
         string = cos(guess.string_rad), sin(guess.string_rad), -wedge if guess.faces else wedge
     _GIVEN.pack_into(
         desk.numbers, 0, guess.x_px - patch.x_px, guess.y_px - patch.y_px, look.radius_px, look.edge_px * soften,
-        guess.streak_x_px, guess.streak_y_px, *string, look.noise, contrast,
+        guess.streak_x_px, guess.streak_y_px, guess.bend_x_px, guess.bend_y_px, *string, look.noise, contrast,
     )  # fmt: skip
     image, back, seen = _plain(patch.image), _plain(patch.back), _plain(patch.seen)
     _PLACES.pack_into(

@@ -46,7 +46,9 @@ class Look(NamedTuple):
 class Guess(NamedTuple):
     """Where the bob is expected: centre in the whole frame, the streak (vector) that it draws during the exposure,
     and the direction from the bob to the string (radians, image axes; NaN if no string is to be expected). Where it `faces` it,
-    the outline is left out as far on the other side of the bob as at the string."""
+    the outline is left out as far on the other side of the bob as at the string. The streak bends: at the part u of the exposure,
+    −½ to ½, the bob is streak·u + bend·u² from where it is in the middle, the bend being half its acceleration times the exposure
+    squared."""
 
     x_px: float
     y_px: float
@@ -54,6 +56,8 @@ class Guess(NamedTuple):
     streak_y_px: float = 0.0
     string_rad: float = np.nan
     faces: bool = False
+    bend_x_px: float = 0.0
+    bend_y_px: float = 0.0
 
 
 class Place(NamedTuple):

@@ -99,10 +99,9 @@ class Follower(Known):
     def follow(self, frame: Frame) -> None:
         """Measure one frame, in the order of the file."""
         shift = self._camera(frame)
-        guess = self._ahead(frame)
-        if (self.hidden or len(self.recent) < 3) and frame.index in self.found:
-            # the motion fitted to the start may be poor at its rim
-            guess = self._guess(*self.found[frame.index], guess.streak_x_px, guess.streak_y_px)
+        # the motion fitted to the start may be poor at its rim
+        found = self.found.get(frame.index) if self.hidden or len(self.recent) < 3 else None
+        guess = self._ahead(frame, found)
         before, self._picture = self._picture, frame
         place, patch = self._measure(frame, guess)
         repeated = before is not None and not (patch is not None and self._moved(place)) and alike(before, frame)
@@ -390,14 +389,14 @@ class Follower(Known):
                     self.hidden += 1
         self.recent, self.hidden, self._picture = kept
 
-    def _ahead(self, frame: Frame) -> Guess:
-        """Where the bob should be on the frame, and its streak."""
+    def _ahead(self, frame: Frame, found: tuple[float, float] | None = None) -> Guess:
+        """Where the bob should be on the frame, or was `found`, and its streak."""
         x, y, vx, vy = self._expect(frame.t_s)
         self._speed = hypot(vx, vy)
         # else the motion ran away: no bob crosses the picture in a frame
         if not self._speed * self.interval_s < max(self.shape):
             self._speed = vx = vy = 0.0
-        return self._guess(x, y, vx * self.exposure_s, vy * self.exposure_s)
+        return self._guess(*(found or (x, y)), vx, vy, self.exposure_s)
 
     def _expect(self, t: float) -> tuple[float, float, float, float]:
         """Where the bob should be at time t and how fast, px and px/s: the fitted motion, moved by how far the bob was

@@ -188,7 +188,7 @@ class Known:
         places = points
 
         def show(i: int, x: float, y: float) -> tuple[Guess, Patch | None]:
-            guess = self._guess(x, y, 0.0, 0.0)
+            guess = self._guess(x, y, 0.0, 0.0, 0.0)
             return guess, self._patch(batch[i], look, guess)
 
         some = dict(list(points.items())[:: max(1, len(points) // _SAMPLES)])
@@ -257,7 +257,7 @@ class Known:
         for i, found in points.items():
             place = found
             for soften in _CASTS:
-                guess = self._guess(*place, 0.0, 0.0)
+                guess = self._guess(*place, 0.0, 0.0, 0.0)
                 patch = self._patch(batch[i], look, guess)
                 fit = None if patch is None else fit_disc(patch, look, guess, soften=soften, turns=12)
                 if patch is None or fit is None:
@@ -287,7 +287,7 @@ class Known:
         half = (2.5 * look.radius_px + 12,) * 2
         seen = []
         for i in slow:
-            guess = self._guess(*points[i], 0.0, 0.0)
+            guess = self._guess(*points[i], 0.0, 0.0, 0.0)
             patch = self._patch(batch[i], look, guess, half)
             if patch is not None:
                 seen.append((patch, guess))
@@ -299,7 +299,8 @@ class Known:
         velocity = self.swing.velocity(np.array([batch[i].t_s for i in numbers]))
 
         def show(k: int, look: Look, centre: tuple[float, float], streak_s: float) -> tuple[Guess, Patch | None]:
-            guess = self._guess(*centre, *(float(v[k]) * streak_s for v in velocity))
+            vx, vy = (float(v[k]) for v in velocity)
+            guess = self._guess(*centre, vx, vy, streak_s)
             return guess, self._patch(batch[numbers[k]], look, guess)
 
         x, y = np.array(list(points.values())).T
@@ -412,8 +413,8 @@ class Known:
         self.look, self.exposure_s, self.growth = looks
         velocity = self.swing.velocity(np.array([batch[i].t_s for i in points]))
         places = {}
-        for i, vx, vy in zip(points, *(v * self.exposure_s for v in velocity)):
-            guess = self._guess(*points[i], float(vx), float(vy))
+        for i, vx, vy in zip(points, *velocity):
+            guess = self._guess(*points[i], float(vx), float(vy), self.exposure_s)
             patch = self._patch(batch[i], self.look, guess)
             place = NOWHERE if patch is None else localiser.locate(patch, self.look_at(guess), guess)
             place, _ = self._beside_shadow(localiser, batch[i], guess, place) or (place, patch)
@@ -465,9 +466,15 @@ class Known:
                     return found
         return found if self.shaking and found is not None else STILL
 
-    def _guess(self, x: float, y: float, bx: float, by: float) -> Guess:
+    def _guess(self, x: float, y: float, vx: float, vy: float, exposure_s: float) -> Guess:
+        """Of a bob there, at this velocity (px/s), that the shutter shows for so long."""
         px, py = self.pivot or self.swing.pivot_px
-        return Guess(x, y, bx, by, atan2(py - y, px - x))
+        string = atan2(py - y, px - x)
+        if not exposure_s:
+            return Guess(x, y, 0.0, 0.0, string)
+        ax, ay = self.swing.acceleration_at(x, y, vx, vy)
+        half = 0.5 * exposure_s * exposure_s
+        return Guess(x, y, vx * exposure_s, vy * exposure_s, string, bend_x_px=half * ax, bend_y_px=half * ay)
 
     def look_at(self, guess: Guess) -> Look:
         """The bob's looks at a place: nearer to the camera it is larger."""

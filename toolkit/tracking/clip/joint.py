@@ -23,8 +23,8 @@ _SETTLED = 0.6  # another view is fitted only where the last made σ smaller tha
 
 class Camera(NamedTuple):
     """What is known of the camera before a view is fitted: the picture's size, the pivot if given, along which axis its rows
-    are read, how far the places may be off the bob's centre, true frame rate over the file's, whether the bob is of one shade, and
-    whether it casts a shadow beside it."""
+    are read, how far the places may be off the bob's centre, true frame rate over the file's, whether the bob is of one shade,
+    whether it casts a shadow beside it, and for how long (of the places' time) the shutter is open."""
 
     size_px: tuple[int, int]
     pivot_px: tuple[float, float] | None
@@ -33,6 +33,7 @@ class Camera(NamedTuple):
     fps_factor: float
     even: bool = True
     shaded: bool = False
+    exposure_s: float = 0.0
 
 
 class Joint(NamedTuple):
@@ -61,13 +62,15 @@ def fit_jointly(
     start = swing.values_at(t[good][0], camera.fps_factor)
     when = t / camera.fps_factor
     mx, my = swing.position(t)
-    joint = Joint(None, bars.about(mx, my, rough=True), mx, my)
+    # the places are means over the exposure: a view is one of where the bob was in the middle of it
+    mean_x, mean_y = swing.over_exposure(t, camera.exposure_s)
+    joint = Joint(None, bars.about(mx + mean_x, my + mean_y, rough=True), mx + mean_x, my + mean_y)
     for _ in range(_VIEWS):
         scale = joint.bars
         found = fit_view(
             when[good],
-            places.x_px[good],
-            places.y_px[good],
+            (places.x_px - mean_x)[good],
+            (places.y_px - mean_y)[good],
             np.sqrt(scale.sigma_x_px**2 + late_x**2 + scale.shake_px**2)[good],
             np.sqrt(scale.sigma_y_px**2 + late_y**2 + scale.shake_px**2)[good],
             start,
@@ -80,11 +83,12 @@ def fit_jointly(
         )
         if found is None:
             break
-        seen = found.position(when, joint.x_px, joint.y_px)
+        drawn = found.position(when, joint.x_px, joint.y_px)
         plain = camera.even and not camera.shaded and "bob" not in found.shown
         best = found.likeliest if plain else None
-        told = seen if best is None else replace(found, values=best).position(when, joint.x_px, joint.y_px)
-        joint = Joint(found, bars.about(*told, full=best is not None), *seen)
+        x, y = drawn if best is None else replace(found, values=best).position(when, joint.x_px, joint.y_px)
+        scaled = bars.about(x + mean_x, y + mean_y, full=best is not None)
+        joint = Joint(found, scaled, drawn[0] + mean_x, drawn[1] + mean_y)
         after = joint.bars
         if not found.shown or min(after.x / scale.x, after.y / scale.y) > _SETTLED:
             break

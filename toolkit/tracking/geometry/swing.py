@@ -10,7 +10,7 @@ from __future__ import annotations
 from ctypes import addressof, c_double, c_void_p, cast
 from dataclasses import dataclass
 from functools import cache
-from math import remainder, tau
+from math import cos, hypot, remainder, sin, tau
 from typing import Any
 
 import numpy as np
@@ -82,6 +82,22 @@ class Swing:
         direction = theta + self.values[3]
         speed = self.values[2] * rate
         return speed * np.cos(direction), -speed * np.sin(direction)
+
+    def acceleration_at(self, x_px: float, y_px: float, vx: float, vy: float) -> tuple[float, float]:
+        """x'', y'' (px/s²) of a bob there, at this velocity (px/s): by gravity along the arc, by the string towards the pivot."""
+        px, py, length, vertical, omega2, *_ = self.values.tolist()
+        dx, dy = x_px - px, y_px - py
+        away = max(hypot(dx, dy), 1.0)
+        ux, uy = dx / away, dy / away
+        drawn = omega2 * length * (ux * cos(vertical) - uy * sin(vertical))
+        inward = (vx * vx + vy * vy) / away
+        return -drawn * uy - inward * ux, drawn * ux - inward * uy
+
+    def over_exposure(self, t_s: np.ndarray, exposure_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """By how much (px) the mean place over an exposure about t_s (n,) lies beside the place at t_s (Simpson's rule)."""
+        before, at, after = (np.array(self.position(t_s + k * exposure_s)) for k in (-0.5, 0.0, 0.5))
+        x, y = (before - 2 * at + after) / 6
+        return x, y
 
     def values_at(self, t_s: float, fps_factor: float = 1.0) -> np.ndarray:
         """The values (9,) with the state at t_s, for times divided by `fps_factor`."""
