@@ -11,7 +11,7 @@ from test_track import LENGTH, PIVOT, angles, draw, film, swing_clip
 
 from toolkit.errors import UsageError
 from toolkit.sentence import said
-from toolkit.track import Asked, _begin, _looks, _sounder, track
+from toolkit.track import Asked, _begin, _looks, _soundest, track
 from toolkit.tracking.clip.soundness import faults, is_sound
 from toolkit.video import open_video
 
@@ -36,10 +36,16 @@ def test_a_track_is_sound_if_it_has_nearly_all_frames_and_no_warning_of_its_plac
 
 
 def test_a_brief_look_is_for_films_that_show_enough_in_it():
-    looks = {fps: _looks(SimpleNamespace(fps_header=fps)) for fps in (None, 30.0, 59.94, 240.0)}
-    assert [look.brief for look in looks[59.94]] == [True, False, False, False]
-    assert looks[240.0] == looks[59.94]
+    looks = {
+        fps: _looks(SimpleNamespace(fps_header=fps, width_px=640, height_px=480)) for fps in (None, 30.0, 59.94, 120.0)
+    }
+    assert [look.brief for look in looks[59.94]] == [True, False, False, False, False]
+    assert looks[120.0] == looks[59.94]
     assert looks[None] == looks[30.0] == looks[59.94][1:]
+    spans = [look.most_s for look in looks[30.0] if look.every == 1]
+    assert spans == sorted(spans)
+    large = _looks(SimpleNamespace(fps_header=60.0, width_px=3840, height_px=2160))
+    assert sum(look.every == 1 and not look.brief for look in large) == 1  # memory holds no longer a look
 
 
 def test_a_clear_bob_needs_no_thorough_look(clip):
@@ -64,14 +70,16 @@ def test_a_bob_that_hardly_moves_yet_gets_a_thorough_look(tmp_path):
     assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
 
 
-def test_of_two_tracks_the_sounder_is_kept_and_that_they_differ_is_said(clip):
+def test_of_some_tracks_the_soundest_is_kept_and_that_they_differ_is_said(clip):
     one = track(clip[0])
     lame = replace(one, x_px=one.x_px + 7.0, meta={**one.meta, "warnings": [STRAYS]})
-    for kept in (_sounder(one, lame), _sounder(lame, one)):
+    for kept in (_soundest([one, lame]), _soundest([lame, lame, one])):
         assert np.array_equal(kept.x_px, one.x_px)
         (warning,) = kept.meta["warnings"]
         assert "7.0 px apart" in warning
-    assert _sounder(one, replace(lame, x_px=one.x_px)).meta["warnings"] == []
+    assert _soundest([replace(lame, x_px=one.x_px), one]).meta["warnings"] == []
+    blind = replace(one, status=np.full_like(one.status, "lost"))
+    assert "no common frame" in _soundest([blind, one]).meta["warnings"][0]
 
 
 def test_a_bob_said_to_be_outside_the_picture_is_misuse(clip):

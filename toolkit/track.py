@@ -44,10 +44,11 @@ from toolkit.video import Frame, Video, clock_warnings, open_video
 
 OK, PREDICTED, LOST = "ok", "predicted", "lost"
 
+_BYTES_KEPT = 2.2e8  # of the frames that are searched
 # of luma: what is decoded while the bob is searched for; each new frame costs memory, which takes time too
 _BYTES_ASIDE = 2e7
 
-_BRIEF_S, _THOROUGH_S = 0.8, 1.6  # of the film: what is searched
+_BRIEF_S, _THOROUGH_S = 0.8, (1.6, 2.4)  # of the film: what is searched
 _BRIEF_FRAMES = 45  # fewer teach too little of the bob's looks
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
 
@@ -122,25 +123,23 @@ def track(
         raise UsageError(f"bob ({bob[0]:g}, {bob[1]:g}) lies outside the picture of {wide}×{high} px")
     asked = Asked(pivot, bob, radius, localiser, start_s, stop_s)
     refusal: JobError | None = None
-    doubtful: Track | None = None
+    found: list[Track] = []
     for look in _looks(video):
-        if doubtful is not None and look.every > 1:
+        if found and look.every > 1:
             break
         try:
             follower = _follow(video, asked, look, progress)
             if follower is None:
                 continue
-            found = _finish(video, _from_release(follower, video, asked, progress), pivot, fps_factor)
+            follower = _from_release(follower, video, asked, progress)
+            found.append(_finish(video, follower, pivot, fps_factor))
         except JobError as error:
             refusal = refusal or (None if look.brief else error)
             continue
-        if not look.brief:
-            return found if doubtful is None else _sounder(found, doubtful)
-        if is_sound(found.ok, found.meta["warnings"]):
-            return found
-        doubtful = found
-    if doubtful is not None:
-        return doubtful
+        if is_sound(found[-1].ok, found[-1].meta["warnings"]):
+            break
+    if found:
+        return _soundest(found)
     raise refusal  # type: ignore[misc]
 
 
@@ -168,11 +167,14 @@ class Look(NamedTuple):
 
 
 def _looks(video: Video) -> list[Look]:
-    """The searches, one after the other: a brief one does for most clips, and a slow swing, slow motion, a hand that holds the bob
-    need a longer time."""
-    longer = [Look(every, every * _THOROUGH_S) for every in (1, 3, 9)]
-    enough = (video.fps_header or 0.0) * _BRIEF_S >= _BRIEF_FRAMES
-    return [Look(1, _BRIEF_S, brief=True), *longer] if enough else longer
+    """The searches, one after the other, until what comes of one is sound: a brief one does for most clips; the longer the look, the
+    more it tells of what stands before and behind the bob; and a slow swing, slow motion, a hand that holds the bob need a long
+    time."""
+    fps = video.fps_header or 30.0
+    most_s = _BYTES_KEPT / (1.5 * video.width_px * video.height_px * fps)
+    brief = [Look(1, _BRIEF_S, brief=True)] if fps * _BRIEF_S >= _BRIEF_FRAMES else []
+    thorough = [Look(1, span_s) for span_s in sorted({min(span_s, most_s) for span_s in _THOROUGH_S})]
+    return [*brief, *thorough, *(Look(every, every * _THOROUGH_S[0]) for every in (3, 9))]
 
 
 class Asked(NamedTuple):
@@ -202,12 +204,15 @@ def _follow(video: Video, asked: Asked, look: Look, progress: Progress) -> Follo
     return follower
 
 
-def _sounder(one: Track, other: Track) -> Track:
-    """The better of two tracks of a clip; it warns where the other has the bob elsewhere."""
-    best = min(one, other, key=lambda track: faults(track.ok, track.meta["warnings"]))
-    both = one.ok & other.ok
-    places = (np.array([track.x_px[both], track.y_px[both]]) for track in (one, other))
-    return replace(best, meta={**best.meta, "warnings": [*best.meta["warnings"], *apart_told(*places)]})
+def _soundest(tracks: list[Track]) -> Track:
+    """The best of some tracks of a clip; it warns where another has the bob elsewhere."""
+    best = min(tracks, key=lambda track: faults(track.ok, track.meta["warnings"]))
+    told: list[str] = []
+    for other in tracks:
+        both = best.ok & other.ok
+        places = (np.array([track.x_px[both], track.y_px[both]]) for track in (best, other))
+        told = told or apart_told(*places)
+    return replace(best, meta={**best.meta, "warnings": [*best.meta["warnings"], *told]})
 
 
 def _from_release(follower: Follower, video: Video, asked: Asked, progress: Progress) -> Follower:
@@ -220,7 +225,7 @@ def _from_release(follower: Follower, video: Video, asked: Asked, progress: Prog
         return follower
     bob = None if asked.bob is None else record.place[late][:2]
     try:
-        again = _follow(video, asked._replace(bob=bob, start_s=record.t_s[late]), Look(1, _THOROUGH_S), progress)
+        again = _follow(video, asked._replace(bob=bob, start_s=record.t_s[late]), Look(1, _THOROUGH_S[0]), progress)
     except JobError:
         return follower
     if again is None:
@@ -291,7 +296,7 @@ def _expected_frames(video: Video, start_s: float | None, stop_s: float | None) 
     return max(1, int((stop - (start_s or 0.0)) * (video.fps_header or 30.0))) if stop < 1e9 else 1000
 
 
-def _read_ahead(frames: Iterator[Frame], look: Look, most_bytes: float = 2.2e8) -> list[Frame]:
+def _read_ahead(frames: Iterator[Frame], look: Look) -> list[Frame]:
     """The first frames (or every n-th of them), kept in memory for the search."""
     batch: list[Frame] = []
     size = 0.0
@@ -300,7 +305,7 @@ def _read_ahead(frames: Iterator[Frame], look: Look, most_bytes: float = 2.2e8) 
             continue
         batch.append(frame)
         size += 1.5 * frame.luma.size
-        if len(batch) >= 24 and (size > most_bytes or frame.t_s - batch[0].t_s > look.most_s):
+        if len(batch) >= 24 and (size > _BYTES_KEPT or frame.t_s - batch[0].t_s > look.most_s):
             break
     return batch
 
