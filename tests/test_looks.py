@@ -11,7 +11,7 @@ from test_track import H, W, film
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Guess, Look, Patch
 from toolkit.tracking.begin.learn import _by_speed
-from toolkit.tracking.picture.looks import Sightings, _nears, learn_looks
+from toolkit.tracking.picture.looks import Sightings, _nears, _total, learn_looks
 from toolkit.tracking.picture.stillness import Anchors
 
 pytest.importorskip("av")
@@ -52,6 +52,16 @@ def test_the_exposure_is_told_by_the_streak(exposure_s, lag):
     assert found.look.radius_px == pytest.approx(RADIUS, abs=0.1)
     assert found.look.edge_px == pytest.approx(EDGE, abs=0.25)
     assert found.look.even
+
+
+def test_what_is_clear_without_a_streak_and_seen_with_none_says_that_there_is_none():
+    """Misfits squared of ten sightings with streaks of 0 to 10 tenths: three half behind a post are like a streak's end, whichever."""
+    cost = np.full((11, 10), np.nan)
+    cost[0] = 9.0
+    cost[:7:3, 7:] = [[50.0] * 3, [20.0] * 3, [10.0] * 3]
+    assert np.argmin(_total(cost, 3)) == 0
+    cost[0, :7] = 60.0  # not clear: then a fit that failed says nothing
+    assert np.argmin(_total(cost, 3)) == 6
 
 
 def growing(x, speed, size, walls=None):

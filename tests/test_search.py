@@ -10,7 +10,7 @@ from test_track import LENGTH, PIVOT, RADIUS, H, W, angles, film
 
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Look
-from toolkit.tracking.begin.acquire import _is_shadow_of
+from toolkit.tracking.begin.acquire import _is_shadow_of, find_bob
 from toolkit.tracking.begin.search import find_round_movers, find_round_near
 from toolkit.tracking.begin.trail import Rough
 from toolkit.tracking.geometry.swing import fit_swing, start_swing
@@ -93,6 +93,34 @@ def test_lost_frames_lose_no_bob(tmp_path):
     found = track(film(tmp_path / "lost.mp4", frames))
     assert (found.status == OK).mean() > 0.95
     assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
+
+
+def shown(pictures):
+    """Frames, 60 a second."""
+    return [Frame(k, k / 60, picture, lambda kind: None) for k, picture in enumerate(pictures)]
+
+
+@pytest.mark.parametrize(("radius_px", "off_px", "level"), [(2.5, 4, 160.0), (3.0, 3, 160.0), (3.0, 4, 170.0)])
+def test_a_highlight_is_not_taken_for_the_bob(radius_px, off_px, level):
+    """On a dark bob before a rough wall it is the clearest thing that swings; but what is about it swings too."""
+    rough = cv2.GaussianBlur(np.random.default_rng(5).normal(0, 1, (H, W)), (0, 0), 4)
+    frames, x, y = swinging(1.6, behind=140 + 14 * rough / rough.std())
+    for frame, a, b in zip(frames, x, y):
+        spot = disc(a - off_px, b - off_px, radius_px, (H, W))
+        frame[:] = (frame * (1 - spot) + level * spot).astype(np.uint8)
+    found = find_bob(shown(frames), None, None, "drawn")
+    assert found.look.radius_px == pytest.approx(RADIUS, abs=1)
+    assert np.median([np.hypot(px - x[k], py - y[k]) for k, (px, py) in found.points.items()]) < 0.5
+
+
+@pytest.mark.parametrize(("x_px", "y_px"), [(96.0, 177.0), (100.0, 171.0), (92.0, 177.0)])
+def test_what_stands_where_the_bob_turns_and_looks_like_it_does_not_hold_it(x_px, y_px):
+    bob_like = disc(x_px, y_px, RADIUS, (H, W))
+    wall = np.full((H, W), 190.0) * (1 - bob_like) + 60.0 * bob_like
+    frames, x, y = swinging(1.6, behind=wall)
+    found = find_bob(shown(frames), None, None, "drawn")
+    near = [np.hypot(px - x[k], py - y[k]) < 2 for k, (px, py) in found.points.items()]
+    assert sum(near) > 0.85 * len(frames)
 
 
 def test_a_wall_full_of_things_is_no_wall_of_one_level(tmp_path):

@@ -13,8 +13,13 @@ from toolkit.trackers.localiser import Guess, Look, Patch
 from toolkit.tracking.begin.search import Hypothesis, find_round_near
 from toolkit.tracking.geometry.swing import Swing, fit_swing, start_swing
 from toolkit.tracking.picture.plane import rim_level, silhouette
-from toolkit.tracking.picture.sight import Sight
+from toolkit.tracking.picture.sight import LUMA, Sight
 from toolkit.video import Frame
+
+_RESTS = 0.05  # of the radius: what moves less from one frame to the next may stand still
+_CHANGES, _MOSTLY = 0.25, 0.5  # of the contrast, and of a disc: what changes less shows the same as before
+_ABOUT_PX = 3.0  # beyond its outline's softness
+_LOOKED_AT = 6  # frames on which it is slow
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,7 @@ class Trail:
     """Where a thing that looks so was seen, by the index of the frame; against a wall of one level, or on a stage.
 
     look : as it was where it was seen first.    looks : as it was on every frame of `points`.
-    repeated : frames that show the one before once more.
+    repeated : frames that show the one before once more.    still : where it was taken for something that stands still.
     """
 
     batch: list[Frame]
@@ -55,10 +60,15 @@ class Trail:
     look: Look
     points: dict[int, tuple[float, float]]
     looks: list[Look] = field(default_factory=list)
+    still: dict[int, tuple[float, float]] = field(default_factory=dict)
+
+    def _at(self, i: int) -> tuple[float, float] | None:
+        """Where on frame i it is, or something like it that stands still."""
+        return self.points.get(i, self.still.get(i))
 
     def holds(self, h: Hypothesis, start: int) -> bool:
         """Is the hypothesis on what was followed here?"""
-        place = self.points.get(start)
+        place = self._at(start)
         return (
             place is not None
             and bool(np.hypot(place[0] - h.x_px, place[1] - h.y_px) < 0.7 * self.look.radius_px)
@@ -68,7 +78,7 @@ class Trail:
     def meets(self, other: Trail) -> bool:
         """Does the other one begin on what was followed here, and does it look the same?"""
         (start, (x, y)), look = next(iter(other.points.items())), other.look
-        place = self.points.get(start)
+        place = self._at(start)
         return (
             place is not None
             and hypot(place[0] - x, place[1] - y) < 0.2 * self.look.radius_px
@@ -85,7 +95,10 @@ class Trail:
         start = next(iter(self.points))
         for way in (1, -1):
             self._go(start, way)
+        self._leave_out_still()
         swing = self._fill_gaps()
+        if self._leave_out_still():
+            swing = swing_through(self.batch, self.points, self.look)
         if swing is None or len(self.points) < max(12, 0.3 * len(self.batch)):
             return None
         size, edge, contrast, noise = (float(np.median([k[n] for k in self.looks])) for n in range(4))
@@ -94,7 +107,7 @@ class Trail:
         size = radius or size
         moved = min(1.0, 0.25 * extent / size)  # what stands still on a wall that shakes explains little change
         share = len(self.points) / len(self.batch)
-        score = share**2 * moved * _score(Look(size, edge, contrast, noise), swing.rms_px)
+        score = share**2 * moved * self._bounded() ** 2 * _score(Look(size, edge, contrast, noise), swing.rms_px)
         if self.stage is not None and self.stage.silhouette:
             contrast = _contrast(self.batch, self.points, size, self.stage.still)
         points = {i: self.points[i] for i in sorted(self.points)}
@@ -115,6 +128,51 @@ class Trail:
                 else:
                     misses += 1
             i += way
+
+    def _leave_out_still(self) -> bool:
+        """Leave out where it neither moves nor covers anything: that is something like it which stands there, and held what came
+        by. Was there any?"""
+        rests = _RESTS * self.look.radius_px
+        still = {i for i, step in self._steps().items() if step < rests and self._change(i)[0] < _MOSTLY}
+        if still:
+            self.looks = [look for i, look in zip(self.points, self.looks) if i not in still]
+            self.still |= {i: self.points.pop(i) for i in still}
+        return bool(still)
+
+    def _bounded(self) -> float:
+        """How much of what is about it stands still, where it is slow: a highlight or a spot has the rest of the bob about it."""
+        steps = self._steps()
+        slow = sorted(steps, key=lambda i: steps[i])[: max(_LOOKED_AT, len(steps) // 4)]
+        return 1.0 - float(np.median([self._change(i)[1] for i in slow[:: max(1, len(slow) // _LOOKED_AT)]]))
+
+    def _steps(self) -> dict[int, float]:
+        """How far it moves (px) from one point to the next: the longer of the two steps beside each."""
+        numbers = sorted(self.points)
+        step = np.hypot(*np.diff([self.points[i] for i in numbers], axis=0).T) if len(numbers) > 1 else np.zeros(0)
+        longer = np.maximum(np.append(step, 0.0), np.insert(step, 0, 0.0))
+        return dict(zip(numbers, longer.tolist()))
+
+    def _change(self, i: int) -> tuple[float, float]:
+        """Which part of what is there on frame i, and of what is just beyond the outline, is another than where it is farthest away."""
+        (x, y), look = self.points[i], self.look
+        other = max(self.points, key=lambda k: hypot(self.points[k][0] - x, self.points[k][1] - y))
+        near = look.radius_px + 2 * look.edge_px + 1
+        half = near + _ABOUT_PX
+        here, there = (cut(self.batch[k], self.sight, x, y, half) for k in (i, other))
+        if here is None or there is None:
+            return 1.0, 0.0
+        light = 1.0
+        if self.sight.weights == LUMA:
+            bright, before = (float(self.batch[k].luma[::16, ::16].mean()) for k in (i, other))
+            light = bright / max(before, 1.0)
+        if self.stage is not None and self.stage.silhouette:
+            differs = silhouette(here.image, there.image) > _CHANGES * look.contrast
+        else:
+            differs = np.abs(here.image - light * there.image) > _CHANGES * abs(look.contrast)
+        rows, columns = np.ogrid[: differs.shape[0], : differs.shape[1]]
+        far = np.hypot(columns + here.x_px - x, rows + here.y_px - y)
+        within, beyond = differs[far < 0.7 * look.radius_px], differs[(far > near) & (far < half)]
+        return float(np.mean(within)) if within.size else 1.0, float(np.mean(beyond)) if beyond.size else 0.0
 
     def _fill_gaps(self) -> Swing | None:
         """What lies behind a gap, where the motion says; the motion through all that was seen."""

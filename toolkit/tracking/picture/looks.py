@@ -14,6 +14,7 @@ from toolkit.trackers.localiser import Guess, Look, Patch
 _SURE, _GROWN_PX = 6.0, 0.4  # standard deviations, and over the whole swing: so much the bob grows where it nears
 _FEW = 3  # sightings: fewer tell no size on one side of the swing
 _BESIDE = 0.4  # of the radius: so far from where the bob was seen it is not
+_CLEAR = 2.0  # times the least misfit squared that any has
 _MANY = 4000  # pixels of a patch: a part of more tells its light as well
 # what `fit_disc` gives
 _RADIUS, _EDGE, _MISFIT, _VISIBLE, _CONTRAST, _WITHIN = 2, 3, 7, 8, 9, 13
@@ -250,13 +251,16 @@ def _exposure(
 
 def _total(cost: np.ndarray, least: int) -> np.ndarray | None:
     """(trials,) the sum of the clearest sightings' costs (trials, n), NaN where nothing was fitted, of those that were fitted
-    in so many trials at least; infinite for what was not tried; None where there are fewer than three."""
+    in so many trials at least, or very clearly in one; infinite for what was not tried; None where there are fewer than three."""
     fitted = np.isfinite(cost)
-    often = fitted.sum(axis=0) >= least
-    if often.sum() < 3:
+    best = np.min(np.where(fitted, cost, np.inf), axis=0)
+    once = (fitted.sum(axis=0) == 1) & (best < _CLEAR * best.min())
+    used = once | (fitted.sum(axis=0) >= least)
+    if used.sum() < 3:
         return None
-    some = cost[:, often]
-    known = np.where(np.isfinite(some), some, np.nanmax(some, axis=0))
+    some = cost[:, used]
+    # what is clear with one exposure and not seen with any other is as unlike those as anything that was fitted
+    known = np.where(np.isfinite(some), some, np.where(once[used], np.nanmax(some), np.nanmax(some, axis=0)))
     clear = np.argsort(known.min(axis=0))[:6]  # not those on which something hides a part of it
     return np.where(fitted.any(axis=1), known[:, clear].sum(axis=1), np.inf)
 
