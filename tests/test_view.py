@@ -23,7 +23,7 @@ from toolkit.tracking.picture.stillness import CameraShift
 SIGMA = 0.03
 
 
-def seen(theta0=0.44, string=True, bias=(0.0, 0.0), off_px=0.02, **effects):
+def seen(theta0=0.44, string=True, bias=(0.0, 0.0), off_px=0.02, beyond_px=0.0, **effects):
     """View of a filmed swing of 25°, and its truth: noisy places, the string's line on every third frame."""
     camera = {
         "width_px": 640,
@@ -44,20 +44,22 @@ def seen(theta0=0.44, string=True, bias=(0.0, 0.0), off_px=0.02, **effects):
     rng = np.random.default_rng(5)
     t, n = truth.stamp_s, truth.t_s.size
     x, y = truth.x_px + bias[0] + rng.normal(0, SIGMA, n), truth.y_px + bias[1] + rng.normal(0, SIGMA, n)
-    lines = strings(studio, t[::3], rng) if string else None
+    lines = strings(studio, t[::3], rng, beyond_px) if string else None
     sigma = np.full(n, SIGMA)
     view = fit_view(t, x, y, sigma, sigma, start_swing(t, x, y), (640, 480), lines, off_px=off_px)
     return view, truth, (t, x, y)
 
 
-def strings(studio, t, rng):
-    """Straight lines fitted to the string as the picture shows it, bent by lens and shutter as that may be."""
+def strings(studio, t, rng, beyond_px=0.0):
+    """Straight lines fitted to the string as the picture shows it, bent by lens and shutter as that may be; looked for so far
+    `beyond_px` its upper end, where nothing is."""
     fitted = []
     for when in t:
         (x, y), _ = (a.T for a in studio._optics.see(np.linspace(0.05, 0.9, 60), np.full(60, when)))
         slope, x0 = np.polyfit(y, x, 1)
         middle = 0.5 * (y[0] + y[-1])
         half = 0.5 * np.hypot(x[-1] - x[0], y[-1] - y[0])
+        middle, half = middle - 0.5 * beyond_px * np.cos(np.arctan(slope)), half + 0.5 * beyond_px
         fitted.append((x0 + slope * middle, middle, np.arctan(slope) + rng.normal(0, 2e-4), 2e-4, 0.02, half, when))
     return Lines(*np.array(fitted).T)
 
@@ -123,6 +125,15 @@ def test_a_string_that_the_lens_bends_tells_the_lens():
     assert abs(off) < min(1e-3, 4 * u)
     assert rest < 1e-3 * 0.44
     assert np.hypot(*(np.array(view.pivot_px) - truth.pivot_px[0])) < 0.5
+
+
+def test_a_string_looked_for_beyond_its_pivot_ends_there():
+    """The line is that of the bent string's own piece, which is not the piece that was looked at: taken for it, all angles are off."""
+    view, truth, places = seen(0.8, beyond_px=120.0, lens_distortion={"k1": 0.056})
+    assert view.shown == ("lens",)
+    off, u, rest = errors(view, truth, places)
+    assert abs(off) < min(2e-3, 4 * u)
+    assert rest < 1e-3 * 0.8
 
 
 def test_the_string_outvotes_an_arc_that_a_swing_in_depth_bends():

@@ -37,6 +37,7 @@ _POOR = 2.0  # times what σ and bent errors alone leave: then the view may be o
 _SQUARE = (*SWING_NAMES, "factor")
 _BENDING = tuple(AT[name] for name in NAMES[10:])  # what bends the model: sampled; the rest follows linearly
 _MOST = 160  # positions, and half as many lines, are enough to see what the camera did
+_MEETS = 0.1  # of half a line's length: as well the lines have to tell where they meet
 _CLEAR = 25.0  # by how much χ² must fall before a camera effect is believed
 _NEARNESSES = (-1.7, -1.2, -0.7, -0.2, 0.3)  # along which a valley is looked for: two standard deviations either way
 _BENT = 0.5, 3.0  # times σ: a bent error is at least and at most so large; part of a larger one would be seen
@@ -65,6 +66,18 @@ class Lines(NamedTuple):
         """By how much they miss the point in which they meet best (rms but for strays)."""
         meet = line_pivot(self.x_px, self.y_px, self.angle_rad, np.ones(self.x_px.size))
         return np.inf if meet is None else float(np.sqrt(meet.reduced_chi2))
+
+    def below_pivot(self) -> Lines:
+        """The same, each as far up as where they meet: it was looked for as far as the pivot was thought to be, and above the pivot
+        itself there is no string. As they are where it is not clear where they meet."""
+        meet = line_pivot(self.x_px, self.y_px, self.angle_rad, np.ones(self.x_px.size))
+        if meet is None or max(meet.sigma_px) > _MEETS * float(np.median(self.half_px)):
+            return self
+        right, down = np.sin(self.angle_rad), np.cos(self.angle_rad)
+        above = (self.x_px - meet.xy[0]) * right + (self.y_px - meet.xy[1]) * down
+        # a point that lies lower than the middle of what was looked at is none on this string
+        less = np.where(above > 0, 0.5 * np.maximum(self.half_px - above, 0.0), 0.0)
+        return self._replace(x_px=self.x_px + less * right, y_px=self.y_px + less * down, half_px=self.half_px - less)
 
     def seen(self) -> Lines | None:
         """Those that were measured; None where they are too few to tell a pivot."""
@@ -219,6 +232,7 @@ class _Problem:
         self.model = model
         if lines is not None and lines.x_px.size > _MOST // 2:
             lines = lines.of(np.unique(np.linspace(0, lines.x_px.size - 1, _MOST // 2).astype(int)))
+        lines = None if lines is None else lines.below_pivot()
         # all that is known, in one piece: six lists of the places, nine of the lines, three of the values tied
         tied = [(AT[name], *pair) for name, pair in prior.items()]
         if pivot is not None:
