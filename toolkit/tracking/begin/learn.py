@@ -50,6 +50,7 @@ class Trial(NamedTuple):
     visible: tuple[tuple[float, float], tuple[float, float]]
     shade: tuple[float, float]
     strays_px: dict[int, float]  # from the swing, on each frame
+    places: dict[int, tuple[float, float, float]]  # time, x and y on each frame
 
     def calmer_than(self, other: Trial, times: float = 1.0) -> bool:
         """Does the other stray more (than so many times as far), on the frames on which both find the bob?"""
@@ -58,8 +59,24 @@ class Trial(NamedTuple):
         return times**2 * mine < its
 
     def finds_more_than(self, other: Trial) -> bool:
-        """Does it find the bob on more frames, and no less calmly?"""
-        return self.found > 1.05 * other.found and self.swing.rms_px <= 1.05 * other.swing.rms_px
+        """Does it find the bob on more frames, and no less calmly on those on which both find it?"""
+        if self.found <= 1.05 * other.found:
+            return False
+        mine_px, its_px = self.rms_with(other)
+        return mine_px <= 1.05 * its_px
+
+    def rms_with(self, other: Trial) -> tuple[float, float]:
+        """How far (rms, px) this and the other stray from a swing through the frames on which both find the bob: where a camera looks
+        aslant, or where little is seen of the bob, whoever finds it on fewer frames strays less from a swing of its own."""
+        both = sorted(self.places.keys() & other.places.keys())
+        if len(both) == len(self.places) == len(other.places) or len(both) < 10:
+            return self.swing.rms_px, other.swing.rms_px
+        strays = []
+        for trial in (self, other):
+            t, x, y = np.array([trial.places[i] for i in both]).T
+            swing = fit_swing(t, x, y, np.full(t.size, 0.1), trial.swing.values_at(t[0]))
+            strays.append((swing or trial.swing).rms_px)
+        return strays[0], strays[1]
 
 
 class Known:
@@ -353,12 +370,13 @@ class Known:
         if doubted:
             self.choice = _told_choice(found, abs(self.look.contrast))
         # whatever it explains, what leaps about was not found; what errs alike on all frames does not leap
-        calm = _CALM * min(t.swing.rms_px for t in found) + max(0.05, 0.01 * self.look.radius_px)
+        calmest, least = min(found, key=lambda t: t.swing.rms_px), max(0.05, 0.01 * self.look.radius_px)
+        calm = [mine < _CALM * its + least for mine, its in (t.rms_with(calmest) for t in found)]
         # a model with more freedom leaves less of any picture; what an outline that is no circle leaves hardly moves a bob of one shade
         less = 0.0 if self.look.even else 0.7
         # a pattern that pulls its place makes the bob waver, however well the picture is explained
         waver = [not self.look.even and any(other.calmer_than(t, _CLEARLY) for other in found) for t in found]
-        steady = [t for t, wavers in zip(found, waver) if t.swing.rms_px < calm and not wavers] or found
+        steady = [t for t, leaps_not, wavers in zip(found, calm, waver) if leaps_not and not wavers] or found
         best = min(
             (t for t in steady if not any(other.finds_more_than(t) for other in steady)),
             key=lambda t: t.misfit * (less if t.localiser.name == "disc" else 1.0),
@@ -439,9 +457,9 @@ class Known:
         shade = float(np.median(shades))
         scatter = 1.4826 * float(np.median(np.abs(shades - shade)))
         strays = np.hypot(*(drawn - at for drawn, at in zip(swing.position(t), (x, y))))
-        return Trial(
-            localiser, looks, len(places), swing, *ordinary, (shade, scatter), dict(zip(places, strays.tolist()))
-        )
+        seen = dict(zip(places, zip(t.tolist(), x.tolist(), y.tolist())))
+        far = dict(zip(places, strays.tolist()))
+        return Trial(localiser, looks, len(places), swing, *ordinary, (shade, scatter), far, seen)
 
     # --- geometry -------------------------------------------------------------------------------------------------
 
