@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.special import ndtr
@@ -11,7 +13,7 @@ from test_track import H, W, film
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Guess, Look, Patch
 from toolkit.tracking.begin.learn import _by_speed
-from toolkit.tracking.picture.looks import Sightings, _nears, _total, learn_looks
+from toolkit.tracking.picture.looks import Looks, Sightings, _exposure, _nears, _total, learn_looks
 from toolkit.tracking.picture.stillness import Anchors
 
 pytest.importorskip("av")
@@ -195,3 +197,16 @@ def test_a_bob_that_nears_the_camera_on_its_way_is_larger_than_on_its_way_back(n
     x = np.repeat([40.0, 600.0], 8)
     sizes = 17 + nearing * vx + 2e-4 * np.abs(vx) + np.random.default_rng(6).normal(0, 0.03, 16)
     assert _nears(sizes, x, vx, 2800.0) is larger
+
+
+def test_a_streak_that_shows_no_bob_says_nothing_of_the_exposure():
+    bob = Look(10.0, 0.6, -67.0, 2.6)
+
+    def fitted(k, look, exposure_s, centre):  # without a streak the bob, poorly; with one the empty wall, well
+        fit = np.zeros(14)
+        fit[2], fit[3], fit[8] = 10.0, 0.6, 0.9
+        fit[7], fit[9] = (5.3 + 300 * exposure_s, -60.0) if exposure_s < 0.005 else (1.0, -6.0)
+        return fit
+
+    seen = SimpleNamespace(x_px=np.linspace(100, 500, 10), fit_from_far=fitted)
+    assert not _exposure(seen, Looks(bob), np.arange(10), 1 / 30, None, {})

@@ -12,7 +12,7 @@ from test_track import LENGTH, PIVOT, angles, draw, film, swing_clip
 from toolkit.errors import UsageError
 from toolkit.sentence import said
 from toolkit.track import Asked, _begin, _looks, _soundest, track
-from toolkit.tracking.clip.soundness import faults, is_sound
+from toolkit.tracking.clip.soundness import SOUND, faults
 from toolkit.video import open_video
 
 pytest.importorskip("av")
@@ -27,12 +27,13 @@ def clip(tmp_path_factory):
     return path, swing_clip(path)
 
 
-def test_a_track_is_sound_if_it_has_nearly_all_frames_and_no_warning_of_its_places():
+def test_a_track_is_sound_if_it_has_nearly_all_frames_and_explains_them_and_warns_of_no_places():
     frames = np.arange(100)
-    assert is_sound(frames < 95, [HARMLESS])
-    assert not is_sound(frames < 85, [])
-    assert not is_sound(frames < 100, [STRAYS])
-    assert faults(frames < 70, []) > faults(frames < 100, [STRAYS])
+    assert faults(frames < 97, 0.03, [HARMLESS]) < SOUND
+    assert faults(frames < 85, 0.03, []) > SOUND
+    assert faults(frames < 100, 0.15, []) > SOUND
+    assert faults(frames < 100, 0.03, [STRAYS]) > SOUND
+    assert faults(frames < 70, 0.03, []) > faults(frames < 100, 0.03, [STRAYS])
 
 
 def test_a_brief_look_is_for_films_that_show_enough_in_it():

@@ -34,7 +34,7 @@ from toolkit.tracking.clip.joint import Camera, fit_jointly
 from toolkit.tracking.clip.outline import pulled_by_string
 from toolkit.tracking.clip.places import Places
 from toolkit.tracking.clip.shake import Shake
-from toolkit.tracking.clip.soundness import apart_told, faults, is_sound
+from toolkit.tracking.clip.soundness import SOUND, apart_told, faults
 from toolkit.tracking.clip.verdict import poor_motion, poor_picture, require_pendulum
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.geometry.swing import Swing
@@ -136,7 +136,7 @@ def track(
         except JobError as error:
             refusal = refusal or (None if look.brief else error)
             continue
-        if is_sound(found[-1].ok, found[-1].meta["warnings"]):
+        if _faults(found[-1]) < SOUND:
             break
     if found:
         return _soundest(found)
@@ -204,9 +204,14 @@ def _follow(video: Video, asked: Asked, look: Look, progress: Progress) -> Follo
     return follower
 
 
+def _faults(track: Track) -> float:
+    misfit = float(np.median(track.meta["misfit"][track.ok])) if track.ok.any() else np.inf
+    return faults(track.ok, misfit / max(abs(track.meta["contrast"]), 1.0), track.meta["warnings"])
+
+
 def _soundest(tracks: list[Track]) -> Track:
     """The best of some tracks of a clip; it warns where another has the bob elsewhere."""
-    best = min(tracks, key=lambda track: faults(track.ok, track.meta["warnings"]))
+    best = min(tracks, key=_faults)
     told: list[str] = []
     for other in tracks:
         both = best.ok & other.ok

@@ -9,19 +9,16 @@ import numpy as np
 from toolkit.sentence import said
 
 _POOR = frozenset({"track.strays", "track.few", "track.poor_picture"})  # warnings that the places may be wrong
-_TENTH = 0.1  # of the frames: a warning weighs as much
+_TENTH = 0.1  # of the frames, or of the contrast: a warning weighs as much
+SOUND = _TENTH  # with fewer faults there is no reason to look at a clip again
 _APART_PX = 1.0
 
 
-def faults(ok: np.ndarray, warnings: Iterable[str]) -> float:
-    """The share of frames on which the bob was not measured, and a tenth for each warning that its places may be wrong."""
+def faults(ok: np.ndarray, unexplained: float, warnings: Iterable[str]) -> float:
+    """The share of frames on which the bob was not measured, that of its contrast which its looks leave `unexplained` (a shadow that
+    was not told from it), and a tenth for each warning that its places may be wrong."""
     told = {getattr(warning, "key", "") for warning in warnings}
-    return 1.0 - float(np.mean(ok)) + _TENTH * len(told & _POOR)
-
-
-def is_sound(ok: np.ndarray, warnings: Iterable[str]) -> bool:
-    """Is there no reason to look at the clip again?"""
-    return faults(ok, warnings) < _TENTH
+    return 1.0 - float(np.mean(ok)) + unexplained + _TENTH * len(told & _POOR)
 
 
 def apart_told(one_px: np.ndarray, other_px: np.ndarray) -> list[str]:

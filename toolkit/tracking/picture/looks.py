@@ -228,7 +228,7 @@ def _exposure(
             for n, k in enumerate(fast.tolist()):
                 best_yet = clearest.get(k)
                 fit = seen.fit_from_far(k, looks[n], trials[j] * interval_s, best_yet and best_yet.centre)
-                if fit is not None and fit[_VISIBLE] > 0.5:
+                if fit is not None and fit[_VISIBLE] > 0.5 and _shows(fit, looks[n]):
                     cost[j, n] = fit[_MISFIT] ** 2
                     if best_yet is None or cost[j, n] < best_yet.cost:
                         clearest[k] = Clearest(cost[j, n], (float(fit[0]), float(fit[1])))
@@ -247,6 +247,11 @@ def _exposure(
         a, b, c = total[j - 1 : j + 2]
         part += 0.1 * 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
     return float(max(0.0, part) * interval_s)
+
+
+def _shows(fit: np.ndarray, look: Look) -> bool:
+    """Is it as dark, or bright, as a bob of one shade is when it is slow? Of a bob that is not where the fit is, a streak shows nothing."""
+    return not look.even or bool(0.5 < fit[_CONTRAST] / look.contrast < 2.0)
 
 
 def _total(cost: np.ndarray, least: int) -> np.ndarray | None:
