@@ -34,7 +34,7 @@ from toolkit.tracking.clip.joint import Camera, fit_jointly
 from toolkit.tracking.clip.outline import pulled_by_string
 from toolkit.tracking.clip.places import Places
 from toolkit.tracking.clip.shake import Shake
-from toolkit.tracking.clip.soundness import SOUND, apart_told, faults
+from toolkit.tracking.clip.soundness import SOUND, apart_told, faults, go_side_by_side
 from toolkit.tracking.clip.verdict import poor_motion, poor_picture, require_pendulum
 from toolkit.tracking.follow import Follower, Record
 from toolkit.tracking.geometry.swing import Swing
@@ -50,6 +50,7 @@ _BYTES_ASIDE = 2e7
 
 _BRIEF_S, _THOROUGH_S = 0.8, (1.6, 2.4)  # of the film: what is searched
 _BRIEF_FRAMES = 45  # fewer teach too little of the bob's looks
+_CLEARLY = 0.2  # of the frames: a track with so many more of them is better though it is not sound
 _HARMLESS = frozenset({"video.missing_frames", "video.varying_rate"})
 
 
@@ -205,19 +206,32 @@ def _follow(video: Video, asked: Asked, look: Look, progress: Progress) -> Follo
 
 
 def _faults(track: Track) -> float:
-    misfit = float(np.median(track.meta["misfit"][track.ok])) if track.ok.any() else np.inf
-    return faults(track.ok, misfit / max(abs(track.meta["contrast"]), 1.0), track.meta["warnings"])
+    return faults(track.ok, track.meta["warnings"])
 
 
 def _soundest(tracks: list[Track]) -> Track:
-    """The best of some tracks of a clip; it warns where another has the bob elsewhere."""
-    best = min(tracks, key=_faults)
+    """The best of some tracks of a clip, but no shadow's; it warns where another has the bob elsewhere."""
+    bobs = [track for track in tracks if not any(_is_shadow_of(track, other) for other in tracks)]
+    best, *later = bobs or tracks
+    for track in later:  # a longer look is no better in itself
+        if _faults(track) < max(SOUND, _faults(best) - _CLEARLY):
+            best = track
     told: list[str] = []
     for other in tracks:
-        both = best.ok & other.ok
-        places = (np.array([track.x_px[both], track.y_px[both]]) for track in (best, other))
-        told = told or apart_told(*places)
+        told = told or apart_told(*_on_common_frames(best, other))
     return replace(best, meta={**best.meta, "warnings": [*best.meta["warnings"], *told]})
+
+
+def _is_shadow_of(one: Track, other: Track) -> bool:
+    """Is the one of something that goes along beside the other, fainter and softer?"""
+    fainter = abs(one.meta["contrast"]) < abs(other.meta["contrast"]) and one.meta["edge_px"] > other.meta["edge_px"]
+    return fainter and go_side_by_side(*_on_common_frames(one, other), max(one.radius_px, other.radius_px))
+
+
+def _on_common_frames(one: Track, other: Track) -> tuple[np.ndarray, np.ndarray]:
+    """Both tracks' places, (2, n) px, on the frames that both measured."""
+    both = one.ok & other.ok
+    return np.array([one.x_px, one.y_px])[:, both], np.array([other.x_px, other.y_px])[:, both]
 
 
 def _from_release(follower: Follower, video: Video, asked: Asked, progress: Progress) -> Follower:

@@ -8,17 +8,29 @@ import numpy as np
 
 from toolkit.sentence import said
 
-_POOR = frozenset({"track.strays", "track.few", "track.poor_picture"})  # warnings that the places may be wrong
-_TENTH = 0.1  # of the frames, or of the contrast: a warning weighs as much
+_POOR = frozenset({"track.strays", "track.few"})  # warnings that the places may be wrong
+_TENTH = 0.1  # of the frames: a warning weighs as much
 SOUND = _TENTH  # with fewer faults there is no reason to look at a clip again
 _APART_PX = 1.0
+_TOGETHER, _MOSTLY = 0.4, 0.7  # of the radius, and of the frames: what strays less on so many goes along
 
 
-def faults(ok: np.ndarray, unexplained: float, warnings: Iterable[str]) -> float:
-    """The share of frames on which the bob was not measured, that of its contrast which its looks leave `unexplained` (a shadow that
-    was not told from it), and a tenth for each warning that its places may be wrong."""
+def faults(ok: np.ndarray, warnings: Iterable[str]) -> float:
+    """The share of frames on which the bob was not measured, and a tenth for each warning that its places may be wrong. A bob that does
+    not look as it should is none: it would not on a longer look."""
     told = {getattr(warning, "key", "") for warning in warnings}
-    return 1.0 - float(np.mean(ok)) + unexplained + _TENTH * len(told & _POOR)
+    return 1.0 - float(np.mean(ok)) + _TENTH * len(told & _POOR)
+
+
+def go_side_by_side(one_px: np.ndarray, other_px: np.ndarray, radius_px: float) -> bool:
+    """Are two tracks, (2, n) px on the frames that both measured, of two things that go along beside one another: a bob and its
+    shadow?"""
+    off = one_px - other_px
+    if not off.size:
+        return False
+    usual = np.median(off, axis=1, keepdims=True)
+    together = np.hypot(*(off - usual)) < _TOGETHER * radius_px
+    return bool(np.hypot(*usual[:, 0]) > radius_px and np.mean(together) > _MOSTLY)
 
 
 def apart_told(one_px: np.ndarray, other_px: np.ndarray) -> list[str]:
