@@ -459,7 +459,7 @@ def run_speed(video: Path, repeats: int = 7) -> None:
     follower = begun[0]
     frame = batch[len(batch) // 2]
     x, y, vx, vy = follower._expect(frame.t_s)
-    guess = follower._guess(x, y, vx * follower.exposure_s, vy * follower.exposure_s)
+    guess = follower._guess(x, y, vx, vy, follower.exposure_s)
     patch = follower._patch(frame, follower.look, guess)
     assert patch is not None
     locate = load_tracker("disc").locate
