@@ -93,3 +93,14 @@ def test_an_ellipse_before_a_tilted_camera_is_a_swing_but_not_what_leaps_about_i
             require_pendulum(swing, places, SIZE_PX, Path("clip.mp4"))
     else:
         require_pendulum(swing, places, SIZE_PX, Path("clip.mp4"))
+
+
+def test_a_motion_that_is_beyond_all_numbers_on_a_frame_before_it_was_seen_is_refused():
+    seen = TIMES >= 0.4
+    swing = Swing(np.array([320.0, 20.0, 400.0, 0.0, 50.0, 0.0, 2.0, 0.8, -17.0]), np.zeros((9, 9)), 0.4, 0.02)
+    assert np.isfinite(swing.angle(TIMES[seen])).all()
+    assert not np.isfinite(swing.angle(TIMES)).all()  # so quick a bob, its drag undone, is infinitely quick in no time
+    x, y = swing.position(TIMES)
+    sigma = np.full(TIMES.size, 0.02)
+    with pytest.raises(JobError, match="does not turn back"):
+        require_pendulum(swing, Places(TIMES, x, y, sigma, sigma, seen, ~seen), SIZE_PX, Path("clip.mp4"))

@@ -32,11 +32,12 @@ def require_pendulum(swing: Swing, places: Places, size_px: tuple[int, int], pat
     half = 0.5 * swing.period_s
     if half / _ENDLESS < span < half:
         raise JobError(f"{path} shows {span:.2f} s, less than half a period ({half:.2f} s); film at least one period")
-    amplitude = swing.amplitude_rad(t[good])
+    theta = np.abs(swing.angle(t)[0])
     reasons = []
     if swing.values[4] <= 0:
         reasons.append("nothing pulls it back")
-    if span <= half / _ENDLESS or not 0 < amplitude < np.pi:
+    # what was not fitted, at the ends, need not be a swing, but no motion of a pendulum goes beyond all numbers there
+    if span <= half / _ENDLESS or not (0 < theta[good].max() < np.pi and np.isfinite(theta).all()):
         reasons.append("it does not turn back")
     straight = swing.length_px > STRAIGHT * np.hypot(*size_px)
     clear = good.mean() > 0.95 and misfit < _UNLIKE

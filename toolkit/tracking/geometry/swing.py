@@ -108,10 +108,6 @@ class Swing:
         values[5] *= fps_factor
         return values
 
-    def amplitude_rad(self, t_s: np.ndarray) -> float:
-        """Largest |θ| at the given times."""
-        return float(np.max(np.abs(self.angle(t_s)[0])))
-
 
 def _place(values: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     direction = np.where(np.isfinite(theta), theta, np.nan) + values[3]
