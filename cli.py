@@ -135,7 +135,7 @@ def about(
 
 @app.command()
 def demo(out: Out = None, lang: Lang = "en") -> None:
-    """The main job on a shipped sample video; prints the report's path."""
+    """The main job on a shipped sample video."""
     from toolkit.samples import sample
     from toolkit.scene import Scene
 
@@ -191,7 +191,7 @@ def fit(
     out: Out = None,
     model: Models = None,
 ) -> None:
-    """Fit the models to a θ(t) file (or a video): fit.json, residuals.csv."""
+    """Fit the models to a θ(t) file or a video: fit.json, residuals."""
     from toolkit.analyse import analyse, write_analysis
     from toolkit.output import whole_folder
 
@@ -217,8 +217,8 @@ def report(
     model: Models = None,
     overlay: Overlay = False,
 ) -> None:
-    """The whole job on a video or a θ(t) file, with report.html and report.pdf."""
-    _refuse_clicks(recording, told)
+    """The whole job on a video or a θ(t) file: report.html and .pdf."""
+    _refuse_clicks(recording, {**told, "overlay": True} if overlay else told)
     _report(
         recording,
         scene,
@@ -240,7 +240,7 @@ def simulate(
     duration_s: Annotated[float | None, typer.Option("--duration-s", help="Default: the camera's, else 10 s.")] = None,
     rate_hz: Annotated[float | None, typer.Option("--rate-hz", help="Default: the camera's fps, else 100 Hz.")] = None,
 ) -> None:
-    """Solve the equation of motion of SCENE: t, θ, θ̇, tension, energy as CSV."""
+    """Solve the motion of SCENE: t, θ, θ̇, tension, energy as CSV."""
     import numpy as np
 
     from toolkit.errors import UsageError
@@ -277,7 +277,7 @@ def render(
     scene: Path,
     out: Annotated[Path, typer.Option("--out", help="Video file to write; its truth goes to NAME.truth.csv.")],
 ) -> None:
-    """Film SCENE: a synthetic video with its exact truth in a side-car."""
+    """Film SCENE: a synthetic video, with its exact truth beside it."""
     from toolkit.render import render as film
     from toolkit.scene import Scene
 
@@ -293,17 +293,11 @@ def cost(
     out: Out = None,
     quick: Quick = False,
 ) -> None:
-    """What accuracy costs in time: tables and plots, measured on this machine, beside public peers."""
-    import importlib
-
-    from toolkit import cost as rooms
-    from toolkit.errors import UsageError
+    """What accuracy costs in time, beside public peers, measured here."""
+    from toolkit.cost import load_subject
     from toolkit.output import whole_folder
-    from toolkit.registry import did_you_mean, part_names
 
-    if what not in part_names(rooms):
-        raise UsageError(f"unknown subject {what!r}{did_you_mean(what, part_names(rooms))}")
-    measure = importlib.import_module(f"toolkit.cost.{what}").measure
+    measure = load_subject(what)
     out = out or Path(f"cost-{what}")
     with _progress() as progress, whole_folder(out) as folder:
         text = measure(folder, quick=quick, progress=progress)
@@ -313,7 +307,7 @@ def cost(
 
 @app.command()
 def paper(out: Out = None) -> None:
-    """The source paper again: its 12 panels with both models, and a verdict on each of its claims."""
+    """The source paper again: 12 panels, a verdict on each claim."""
     from toolkit.output import whole_folder
     from toolkit.paper import reproduce_paper
 
@@ -334,15 +328,20 @@ def batch(
     format: Formats = "html,pdf",
     jobs: Annotated[int, typer.Option("--jobs", help="Recordings at once (default: one a processor).")] = 0,
 ) -> None:
-    """A class at once: one report a recording, summary.csv and index.html."""
+    """A class at once: a report a recording, summary.csv, index.html."""
     from toolkit.batch import analyse_folder
+    from toolkit.report.numbers import bare
+    from toolkit.report.words import load_words
 
     out = out or Path(f"{recordings.name}-reports")
     formats = _formats(format)
     with _progress() as progress:
         rows = analyse_folder(recordings, out, scene, lang=lang, formats=formats, jobs=jobs, progress=progress)
+    note = load_words(lang)("page.note")
     for row in rows:
         typer.echo(f"{row.recording}: {row.sentence}")
+        for line in row.cautions:
+            typer.echo(f"  {note}: {bare(line)}")
     typer.echo(out / "index.html")
     if not any(row.done for row in rows):
         raise typer.Exit(1)
@@ -419,7 +418,9 @@ def main() -> None:
             _fail(error.format_message(), 2, " (--help says more)")
         if os.environ.get("PENDULAB_DEBUG"):
             raise
-        kind = "out of memory" if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"
+        if isinstance(error, MemoryError):
+            _fail("out of memory; smaller pictures, fewer rows or a shorter part (--start, --stop) need less", 1)
+        kind = f"{type(error).__name__}: {error}"
         _fail(f"unexpected trouble ({kind}); set PENDULAB_DEBUG=1 to see where, and tell the developers", 1)
     if code == 130:  # Ctrl-C, by whichever way it came through the parser
         _fail("stopped; nothing unfinished was left behind", 130)
@@ -466,12 +467,13 @@ def _report(recording: Path, scene: "Scene", out: Path, lang: str, **choices: An
 
 
 def _refuse_clicks(recording: Path, told: dict[str, Any]) -> None:
-    """A θ(t) file has no pixels to click on."""
+    """A θ(t) file has no pixels to click or to draw on."""
     from toolkit.analyse import is_video
     from toolkit.errors import UsageError
 
     if told and not is_video(recording):
-        raise UsageError(f"--pivot, --bob, --radius and --fps-factor are for videos; {recording.name} is a θ(t) file")
+        options = "--pivot, --bob, --radius, --fps-factor and --overlay"
+        raise UsageError(f"{options} are for videos; {recording.name} is a θ(t) file")
 
 
 def _formats(text: str) -> tuple[str, ...]:

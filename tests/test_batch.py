@@ -5,6 +5,7 @@ from __future__ import annotations
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -74,6 +75,25 @@ def test_films_with_a_broken_one(class_folder, tmp_path):
     words = " ".join(page.text)
     assert "วิเคราะห์ได้ 2 จาก 3 ไฟล์" in words
     assert "kg/s" in words
+
+
+def test_a_class_in_its_own_order_with_what_to_read_with_care(tmp_path):
+    folder = tmp_path / "class"
+    folder.mkdir()
+    t = np.arange(0, 12, 1 / 30)
+    theta = 0.1 * np.exp(-0.02 * t) * np.cos(4.4 * t) + np.random.default_rng(3).normal(0, 1e-3, t.size)
+    rows = [f"{a:.9g},{b:.9g}" for a, b in zip(t, theta, strict=True)]
+    for name in ("Group 2.csv", "group 10.csv", "group 1.csv"):
+        header = "time,theta_rad" if name == "group 10.csv" else "t_s,theta_rad"  # no unit of time: assumed, and told
+        (folder / name).write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    told = analyse_folder(folder, tmp_path / "out", formats=("html",), jobs=1)
+    assert [row.recording for row in told] == ["group 1.csv", "Group 2.csv", "group 10.csv"]
+    assert [any("seconds were assumed" in line for line in row.cautions) for row in told] == [False, False, True]
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert page.count("seconds were assumed") == 1
+    table = pd.read_csv(tmp_path / "out" / "summary.csv", dtype={"points": str}).set_index("recording")
+    assert "seconds were assumed" in table["read_with_care"]["group 10.csv"]
+    assert table["points"]["group 1.csv"] == "360"
 
 
 def test_a_folder_without_a_recording(tmp_path):

@@ -221,12 +221,30 @@ def test_unsorted_and_duplicate_times_get_a_clear_word(tmp_path):
         (["--model", "full_cubic_drag"], 2, "full_cubic_drag"),
         (["--start", 100], 2, "100"),
         (["--nonsense"], 2, "--nonsense"),
+        (["--overlay"], 2, "are for videos"),
     ],
 )
 def test_wrong_use(tmp_path, words, code, said):
     done = pendulab("report", swing(tmp_path / "swing.csv"), "--out", tmp_path / "out", *words)
     refused(done, code, said)
     assert not (tmp_path / "out").exists()
+
+
+def test_what_is_no_subject_of_cost_and_no_place_for_a_film(tmp_path):
+    refused(pendulab("cost", "problems", "--out", tmp_path / "out"), 2, "fit, integrators, tracking")
+    (tmp_path / "taken.mp4").mkdir()
+    scene = ROOT / "data" / "samples" / "pendulum.toml"
+    refused(pendulab("render", scene, "--out", tmp_path / "taken.mp4"), 2, "is a folder")
+
+
+def test_a_record_that_does_not_move_is_reported(tmp_path):
+    """The fits fail, and the report says so."""
+    rows = "".join(f"{i / 60},0.1,0.001\n" for i in range(300))
+    (tmp_path / "still.csv").write_text("t_s,theta_rad,sigma_theta_rad\n" + rows, encoding="utf-8")
+    done = pendulab("report", tmp_path / "still.csv", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "no fit converged" in done.stdout
+    assert (tmp_path / "out" / "report.pdf").is_file()
 
 
 def test_wrong_points_and_factors(tmp_path):
@@ -292,6 +310,7 @@ def test_version_and_bare_command():
 def test_help_of_every_command():
     listing = pendulab("--help")
     assert listing.returncode == 0
+    assert "..." not in listing.stdout.partition("Commands:")[2]  # every line whole on 80 columns
     for command in [
         "demo",
         "track",

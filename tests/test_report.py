@@ -102,6 +102,8 @@ def test_rounding_keeps_two_digits_and_the_value(value, u):
         (0.5, None, "m", "0.5 m"),
         (0.5, float("nan"), "m", "0.5 m"),
         (float("nan"), 0.1, "m", "–"),
+        (0.1, 3e-33, "rad", "0.1 rad"),  # a fit without residuals: below the value's own rounding
+        (1e-7, 1e-30, "rad", "1 × 10^−7 rad"),
     ],
 )
 def test_values_with_units(value, u, unit, expected):
@@ -169,6 +171,49 @@ def test_a_reader_of_the_first_page_is_warned(analysis, english):
     t = np.arange(300) / 30
     noise = ThetaSeries(t, np.random.default_rng(3).normal(0, 0.01, t.size))
     assert any("explains only" in line for line in build_report(analysed(noise, Scene()), "en").cautions)
+
+
+def test_a_drag_held_at_zero_is_told_by_its_symbol(analysis):
+    from toolkit.report.speech import say_whole
+    from toolkit.report.words import load_words
+    from toolkit.sentence import Sentence
+
+    held = Sentence("alpha_d came out negative", "fit.at_zero", name="alpha_d")
+    for lang, beginning in (("en", "The coefficient α_{d} came"), ("th", "α_{d} ออก")):
+        assert say_whole(load_words(lang), held).startswith(beginning)
+
+
+@pytest.mark.parametrize(("period_s", "words"), [(1.5, "5.7 % longer"), (1.40, "1.3 % shorter")])
+def test_a_stopwatch_is_longer_or_shorter_never_less_than_zero(analysis, period_s, words):
+    from types import SimpleNamespace
+
+    from toolkit.fit import FittedParameter
+    from toolkit.report.essentials import _mean_period
+    from toolkit.report.material import Material
+    from toolkit.report.words import load_words
+
+    one = np.ones(4)
+    measured = SimpleNamespace(period_s=period_s * one, amplitude_rad=0.1 * one)
+    material = Material(analysis, load_words("en"))
+    material.__dict__["cycles"] = measured
+    told = bare(_mean_period(material, FittedParameter(1.41859, 1e-4, "s")))
+    assert words in told
+    assert "−" not in told
+
+
+def test_a_period_is_not_said_to_be_of_a_fit_that_failed(analysis):
+    """Where only the paper's fit converged, its period is named as that: it is no full-sine fit's."""
+    free = analysed(record(seconds=12), Scene())
+    failed = {name: replace(fit, success=name.startswith("small")) for name, fit in free.fits.items()}
+    poor = replace(free, fits=failed, preferred="small_angle_linear_drag")
+    for lang, words, otherwise in (
+        ("en", "from the small-angle fit", "from the full-sine fit"),
+        ("th", "จากสูตรมุมเล็ก", "จากสมการ sin θ เต็ม"),
+    ):
+        for analysis, told in ((free, otherwise), (poor, words)):
+            report = build_report(analysis, lang)
+            question = report.words("question.period")
+            assert next(fact.remark for fact in report.facts if fact.question == question).startswith(told)
 
 
 def test_without_a_mass_no_k_d_is_claimed(analysis):
@@ -576,6 +621,39 @@ def test_results_print_themselves(analysis):
     lines = summary_lines(analysis)
     assert any("k_d" in line for line in lines)
     assert not any("{" in line or "\n" in line for line in lines)
+
+
+@pytest.mark.parametrize("width", [40, 80, 110])
+@pytest.mark.parametrize("lang", ["en", "th"])
+def test_a_terminals_lines_fit_it(analysis, lang, width):
+    """No line is wider than the terminal but for single Thai phrases, which it breaks itself; no number loses its unit; nothing is
+    lost."""
+    from unicodedata import category
+
+    from toolkit.report.terminal import summary_lines
+
+    lines = summary_lines(analysis, lang, width)
+    for line in lines:
+        assert sum(category(c) != "Mn" for c in line) <= width or " " not in line.strip()
+        assert not re.match(r"\s*%", line)
+    whole = summary_lines(analysis, lang, 10**6)
+    assert " ".join(" ".join(lines).split()) == " ".join(" ".join(whole).split())
+
+
+@pytest.mark.parametrize("lang", ["en", "th"])
+def test_every_way_of_reading_tells_what_to_read_with_care(analysis, lang):
+    """What stands under `Read with care` in the report is told in the terminal, in a notebook and on the web page too."""
+    from toolkit.report.notebook import analysis_html
+    from toolkit.report.terminal import summary_lines
+
+    rubs = next(f for f in analysis.findings if f.assumption == "frictionless_pivot")
+    poor = replace(analysis, findings=[*analysis.findings, replace(rubs, verdict="fails")])
+    cautions = build_report(poor, lang).cautions
+    assert len(cautions) == 2
+    shown, lines = analysis_html(poor, lang), summary_lines(poor, lang, 10**6)
+    for caution in cautions:
+        assert any(line.endswith(bare(caution)) for line in lines)
+        assert bare(caution).split(": ")[-1] in bare(re.sub("<[^>]*>", "", shown))
 
 
 # -- what figures do to data ------------------------------------------------------------------------------------------

@@ -92,6 +92,11 @@ def test_plain_clip_with_no_click(plain):
     assert series.meta["calibration"]["pivot_px"][1] < 0  # above the picture
 
 
+def test_a_bob_larger_than_the_picture_is_refused_at_once(plain):
+    with pytest.raises(UsageError, match="radius 1000 px"):
+        track(plain[0], radius=1000)
+
+
 def test_files(plain, tmp_path):
     import csv
     import json

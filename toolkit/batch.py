@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class BatchRow:
     """One recording of a class: whether it was done, a sentence, the numbers for the table, and for the page the answers
-    (question of `report/words` -> answer, with the marks of `report/numbers`)."""
+    (question of `report/words` -> answer, with the marks of `report/numbers`) and what is to be read with care."""
 
     recording: str
     done: bool
@@ -28,6 +29,7 @@ class BatchRow:
     numbers: dict[str, Any] = field(default_factory=dict)
     page: str = ""
     answers: dict[str, str] = field(default_factory=dict)
+    cautions: tuple[str, ...] = ()
 
 
 def analyse_folder(
@@ -56,8 +58,9 @@ def analyse_folder(
         raise JobError(f"{folder} is not a folder; give the folder that holds the recordings")
     if jobs < 0:
         raise UsageError(f"--jobs must be 0 (one a processor) or more, got {jobs}")
-    recordings = sorted(p for p in folder.iterdir() if p.suffix.lower() in VIDEO_SUFFIXES | SERIES_SUFFIXES)
-    recordings = [p for p in recordings if not p.name.endswith(".truth.csv")]
+    known = VIDEO_SUFFIXES | SERIES_SUFFIXES
+    recordings = [p for p in folder.iterdir() if p.suffix.lower() in known and not p.name.endswith(".truth.csv")]
+    recordings.sort(key=_as_people_count)
     if not recordings:
         raise JobError(f"{folder} holds no video and no θ(t) file; known endings are .mp4 .mov .avi … .csv .txt .trk")
     tasks = (
@@ -72,6 +75,12 @@ def analyse_folder(
         progress(f"{len(rows)} of {len(recordings)} recordings", len(rows) / len(recordings))
     _write_summary(rows, out, lang)
     return rows
+
+
+def _as_people_count(path: Path) -> list[tuple[bool, int, str]]:
+    """A key that sorts group2 before group10."""
+    parts = re.findall(r"[0-9]+|[^0-9]+", path.name.casefold())
+    return [(not part.isdigit(), int(part) if part.isdigit() else 0, part) for part in parts]
 
 
 def _distinct_names(recordings: list[Path]) -> list[str]:
@@ -107,28 +116,44 @@ def _analyse_one(path: Path, out: Path, scene: Scene, lang: str, formats: tuple[
         numbers[f"u({key})"] = parameter.stderr
     sentence = f"{analysis.preferred}; small angle {numbers['small_angle']}, linear drag {numbers['linear_drag']}"
     page = next((f"{out.name}/{p.name}" for p in written if p.suffix == ".html"), "")
-    return BatchRow(path.name, True, sentence, numbers, page, _answers(analysis, lang))
+    return BatchRow(path.name, True, sentence, numbers, page, *_told(analysis, lang))
 
 
 _QUESTIONS = ("drag", "period", "small_angle", "linear_drag")
 
 
-def _answers(analysis: Analysis, lang: str) -> dict[str, str]:
-    from toolkit.report.essentials import facts
+def _told(analysis: Analysis, lang: str) -> tuple[dict[str, str], tuple[str, ...]]:
+    """The page's answers and what is to be read with care."""
+    from toolkit.report.essentials import cautions, facts
     from toolkit.report.material import Material
     from toolkit.report.words import load_words
 
     words = load_words(lang)
-    told = {fact.question: fact.answer for fact in facts(Material(analysis, words))}
-    return {key: told.get(words(f"question.{key}"), "–") for key in _QUESTIONS}
+    material = Material(analysis, words)
+    told = {fact.question: fact.answer for fact in facts(material)}
+    return {key: told.get(words(f"question.{key}"), "–") for key in _QUESTIONS}, cautions(material)
 
 
 def _write_summary(rows: list[BatchRow], out: Path, lang: str) -> None:
     import pandas as pd
 
     from toolkit.output import whole_folder
+    from toolkit.report.numbers import bare
 
-    table = pd.DataFrame([{"recording": r.recording, "done": r.done, "message": r.sentence, **r.numbers} for r in rows])
+    table = pd.DataFrame(
+        [
+            {
+                "recording": r.recording,
+                "done": r.done,
+                "message": r.sentence,
+                "read_with_care": " ".join(map(bare, r.cautions)),
+                **r.numbers,
+            }
+            for r in rows
+        ]
+    )
+    if "points" in table:
+        table["points"] = table["points"].astype("Int64")  # counts, though failed rows have none
     with whole_folder(out) as unfinished:
         table.to_csv(unfinished / "summary.csv", index=False)
         (unfinished / "index.html").write_text(_index_page(rows, lang), encoding="utf-8")
@@ -153,6 +178,12 @@ def _index_page(rows: list[BatchRow], lang: str) -> str:
             lines.append(
                 "<tr>" + "".join(f'<td data-name="{html.escape(q)}"><span>{c}</span></td>' for q, c in told) + "</tr>"
             )
+            if row.cautions:
+                care = html.escape(words("page.cautions"))
+                listed = "".join(f"<li>{marked(line)}</li>" for line in row.cautions)
+                lines.append(
+                    f'<tr class="care"><td></td><td data-name="{care}" colspan="4"><b>{care}</b><ul>{listed}</ul></td></tr>'
+                )
         else:
             failed = f'<td data-name="{html.escape(words("class.failed"))}" colspan="4"><span>{html.escape(say_error(words, row.sentence))}</span></td>'
             lines.append(f'<tr class="failed"><td data-name="{html.escape(questions[0])}">{cells[0]}</td>{failed}</tr>')
@@ -165,6 +196,8 @@ def _index_page(rows: list[BatchRow], lang: str) -> str:
 <link rel="icon" href="data:,"><style>
 {style}
 .failed td{{color:var(--bad)}}
+.care td{{border-top:0;font-size:.85em;color:var(--soft)}} .care ul{{margin:0}} .care td:empty{{padding:0}}
+tr:has(+ .care) td{{border-bottom:0}}
 td:nth-child(3) span{{white-space:nowrap}}
 </style></head><body><main>
 <h1>{html.escape(title)}</h1>

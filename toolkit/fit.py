@@ -13,7 +13,7 @@ import numpy as np
 from toolkit.errors import PendulabError, UsageError
 from toolkit.progress import Progress, silent
 from toolkit.scene import Scene
-from toolkit.sentence import Sentence
+from toolkit.sentence import said
 
 if TYPE_CHECKING:
     from toolkit.series import ThetaSeries
@@ -236,10 +236,10 @@ def _freed_length(
     fitted, given = trial.parameters["length"], held[name].parameters["length"].value
     if fitted.stderr is None or abs(fitted.value - given) <= 4 * fitted.stderr:
         return None
-    return Sentence(
-        f"the length given, {given:.4g} m, contradicts the period: the record asks for {fitted.value:.5g} m "
-        f"± {fitted.stderr:.1g} m; the length was fitted. Measure from the pivot to the bob's centre.",
+    return said(
         "fit.length_contradicted",
+        "the length given, {given_m:.4g} m, contradicts the period: the record asks for {fitted_m:.5g} m "
+        "± {fitted_u_m:.1g} m; the length was fitted. Measure from the pivot to the bob's centre.",
         given_m=given,
         fitted_m=fitted.value,
         fitted_u_m=fitted.stderr,

@@ -51,6 +51,8 @@ def _move_all(source: Path, target: Path) -> None:
         if item.is_dir():
             destination.mkdir(exist_ok=True)
             _move_all(item, destination)
+        elif destination.is_dir():
+            raise UsageError(f"{destination} is a folder; give a file name")
         else:
             os.replace(item, destination)
 

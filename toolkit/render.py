@@ -75,6 +75,8 @@ def render(scene: Scene, video_path: str | Path, progress: Progress = silent) ->
     from toolkit.camera.film import Film
 
     video_path = Path(video_path)
+    if video_path.suffix and video_path.is_dir():
+        raise UsageError(f"{video_path} is a folder; give a file name, or a folder's name without a suffix")
     studio = stage(scene)
     shoot, truth = studio.shoot, studio.truth
     even = bool(np.all(np.abs(truth.stamp_s * float(shoot.fps) - np.round(truth.stamp_s * float(shoot.fps))) < 1e-6))

@@ -122,6 +122,10 @@ def track(
     if bob is not None and not (0 <= bob[0] < video.width_px and 0 <= bob[1] < video.height_px):
         wide, high = video.width_px, video.height_px
         raise UsageError(f"bob ({bob[0]:g}, {bob[1]:g}) lies outside the picture of {wide}×{high} px")
+    if radius is not None and 2 * radius >= min(video.width_px, video.height_px):
+        raise UsageError(
+            f"a bob of radius {radius:g} px cannot swing in a picture of {video.width_px}×{video.height_px} px"
+        )
     asked = Asked(pivot, bob, radius, localiser, start_s, stop_s)
     refusal: JobError | None = None
     found: list[Track] = []

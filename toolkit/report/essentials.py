@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.fit import has_full_sine
 from toolkit.report.budgets import whole_budget
 from toolkit.report.document import Fact, Figure, Verdict
 from toolkit.report.material import DRAGS, Material, parameter
@@ -95,13 +96,15 @@ def _without_mass(words: Words, result: FitResult) -> str:
 
 def _mean_period(material: Material, small: FittedParameter) -> str:
     """Where the period is from, and what a stopwatch would give: the median of those measured, with its amplitude."""
-    origin = material.words("answer.from_fit" if small.stderr else "answer.from_length")
+    fitted = "from_fit" if has_full_sine(material.full_sine) else "from_small_fit"
+    origin = material.words(f"answer.{fitted if small.stderr else 'from_length'}")
     if material.cycles is None:
         return origin
     angle = math.degrees(float(np.median(material.cycles.amplitude_rad)))
     longer = float(np.median(material.cycles.period_s))
-    share = percent(longer / small.value - 1)
-    swings = material.words("answer.mean_period", angle=number(angle, 3), period=number(longer, 5), percent=share)
+    share = longer / small.value - 1
+    key = "answer.mean_period" if share >= 0 else "answer.mean_period_shorter"
+    swings = material.words(key, angle=number(angle, 3), period=number(longer, 5), percent=percent(abs(share)))
     return f"{origin}; {swings}"
 
 
@@ -191,7 +194,7 @@ def verdicts(material: Material) -> tuple[Verdict, ...]:
 
 
 def cautions(material: Material) -> tuple[str, ...]:
-    """What the numbers of the first page leave out: failed checks of the record and what was noted about it, three at most.
+    """What the numbers of the first page leave out: failed checks of the record and what was noted about it, weightiest first.
 
     Correlated residuals are not among them: the error bars allow for them, as the answers say.
     """
@@ -203,7 +206,7 @@ def cautions(material: Material) -> tuple[str, ...]:
     ]
     explained = material.explained
     poor = [words("answer.explains_little", percent=percent(explained))] if explained < _EXPLAINED else []
-    return tuple(poor + failed + notes(material))[:3]
+    return tuple(poor + failed + notes(material))
 
 
 def notes(material: Material) -> list[str]:

@@ -114,8 +114,8 @@ def finding_html(finding: Finding, lang: str = "en") -> str:
 
 
 def analysis_html(analysis: Analysis, lang: str = "en") -> str:
-    """The report's first page without its pictures: the answers and the two verdicts."""
-    from toolkit.report.essentials import facts, lead
+    """The report's first page without its pictures: the answers, what to read with care, and all findings."""
+    from toolkit.report.essentials import cautions, facts, lead
     from toolkit.report.material import Material
     from toolkit.report.words import load_words
 
@@ -125,4 +125,9 @@ def analysis_html(analysis: Analysis, lang: str = "en") -> str:
         for f in facts(material)
     )
     told = "".join(finding_html(f, lang) for f in analysis.findings)
-    return f"<div><b>{escape(analysis.source.name)}</b><br>{marked(lead(material))}<table>{rows}</table>{told}</div>"
+    care = "".join(f"<li>{marked(line)}</li>" for line in cautions(material))
+    if care:
+        care = f'<div><b style="color:{_TONES["fails"]}">{escape(material.words("page.cautions"))}</b><ul>{care}</ul></div>'
+    return (
+        f"<div><b>{escape(analysis.source.name)}</b><br>{marked(lead(material))}<table>{rows}</table>{care}{told}</div>"
+    )

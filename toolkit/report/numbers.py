@@ -11,6 +11,8 @@ import re
 from decimal import ROUND_HALF_EVEN, Decimal
 
 _MINUS = "−"
+_ROUNDING = 2.0**-52
+"""An uncertainty below the value's own rounding says nothing."""
 _MARK = re.compile(r"_\{([^{}]*)\}|\^\{([^{}]*)\}|\*\*(.+?)\*\*|(--[a-z][a-z-]+)")
 
 
@@ -40,11 +42,11 @@ def _plain(number: Decimal, quantum: Decimal) -> str:
 
 
 def with_uncertainty(value: float, u: float | None, unit: str = "", digits: int = 6) -> str:
-    """`(0.1234 ± 0.0056) kg/s`, or with a power of ten; without a known `u` the value alone to `digits` digits."""
+    """`(0.1234 ± 0.0056) kg/s`, or with a power of ten; without a known `u`, or one below rounding, the value alone to `digits` digits."""
     if not math.isfinite(value):
         return "–"
     shown = unit_text(unit)
-    if u is None or not math.isfinite(u) or u <= 0:
+    if u is None or not math.isfinite(u) or u <= abs(value) * _ROUNDING:
         return _joined(number(value, digits), shown)
     exponent = _exponent(max(abs(value), u))
     if exponent:
@@ -131,7 +133,12 @@ def rich(text: str) -> list[tuple[str, str]]:
 
 def bare(text: str) -> str:
     """The text without marks, for a terminal, a spreadsheet or an `alt` text; powers of ten as ×10^−5."""
+    return unmarked(text).replace("\u00a0", " ")
+
+
+def unmarked(text: str) -> str:
+    """`bare`, with the spaces at which no line may end."""
     out = []
     for style, part in rich(text):
         out.append(("^" if style == "sup" else "_" if style == "sub" else "") + part)
-    return "".join(out).replace("\u00a0", " ")
+    return "".join(out)

@@ -101,7 +101,7 @@ def _said(words: Words, kind: str, finding: Finding, otherwise: str) -> str:
     if key not in words:
         key = key.removesuffix(".throughout")  # one remedy for both
     if key not in words:
-        return say(words, otherwise)
+        return say_whole(words, otherwise) if otherwise else ""
     try:
         return words(key, **_shown(finding.words_values))
     except (KeyError, IndexError):

@@ -43,14 +43,15 @@ def apart_told(one_px: np.ndarray, other_px: np.ndarray) -> list[str]:
         return [
             said(
                 "track.never_both",
-                "Looked at twice, the clip shows the bob on no common frame: the track may be of something else",
+                "Looked at twice, the clip shows the bob on no common frame: the track may be of something else. See in the report's "
+                "picture of a frame, or with --overlay, whether the circle is on the bob; if not, give --bob X,Y",
             )
         ]
     return [
         said(
             "track.apart",
             "Looked at twice, the clip shows the bob at places that lie {apart_px:.1f} px apart (median): the track may be of something "
-            "else; look at the overlay",
+            "else. See in the report's picture of a frame, or with --overlay, whether the circle is on the bob; if not, give --bob X,Y",
             apart_px=apart,
         )
     ]
