@@ -245,6 +245,8 @@ def test_a_record_that_does_not_move_is_reported(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "no fit converged" in done.stdout
     assert (tmp_path / "out" / "report.pdf").is_file()
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "model preferred by the data" not in page  # nor are the failed fit's numbers shown
 
 
 def test_wrong_points_and_factors(tmp_path):

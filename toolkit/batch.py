@@ -105,16 +105,19 @@ def _analyse_one(path: Path, out: Path, scene: Scene, lang: str, formats: tuple[
     numbers: dict[str, Any] = {
         "points": len(analysis.series),
         "duration_s": analysis.series.duration_s,
-        "preferred_model": analysis.preferred,
+        "preferred_model": analysis.preferred if analysis.best.success else "",
         "small_angle": verdicts.get("small_angle", ""),
         "linear_drag": verdicts.get("linear_drag", ""),
         "reduced_chi2": analysis.best.reduced_chi2,
     }
-    for name, parameter in {**analysis.best.parameters, **analysis.best.derived}.items():
+    found = {**analysis.best.parameters, **analysis.best.derived} if analysis.best.success else {}
+    for name, parameter in found.items():
         key = name if parameter.unit in ("", "1") else f"{name} [{parameter.unit}]"
         numbers[key] = parameter.value
         numbers[f"u({key})"] = parameter.stderr
-    sentence = f"{analysis.preferred}; small angle {numbers['small_angle']}, linear drag {numbers['linear_drag']}"
+    model = analysis.preferred if analysis.best.success else "no fit converged"
+    small, linear = (numbers[name].replace("_", " ") for name in ("small_angle", "linear_drag"))
+    sentence = f"{model}; small angle {small}, linear drag {linear}"
     page = next((f"{out.name}/{p.name}" for p in written if p.suffix == ".html"), "")
     return BatchRow(path.name, True, sentence, numbers, page, *_told(analysis, lang))
 
@@ -181,9 +184,7 @@ def _index_page(rows: list[BatchRow], lang: str) -> str:
             if row.cautions:
                 care = html.escape(words("page.cautions"))
                 listed = "".join(f"<li>{marked(line)}</li>" for line in row.cautions)
-                lines.append(
-                    f'<tr class="care"><td></td><td data-name="{care}" colspan="4"><b>{care}</b><ul>{listed}</ul></td></tr>'
-                )
+                lines.append(f'<tr class="care"><td></td><td colspan="4"><b>{care}</b><ul>{listed}</ul></td></tr>')
         else:
             failed = f'<td data-name="{html.escape(words("class.failed"))}" colspan="4"><span>{html.escape(say_error(words, row.sentence))}</span></td>'
             lines.append(f'<tr class="failed"><td data-name="{html.escape(questions[0])}">{cells[0]}</td>{failed}</tr>')
@@ -196,8 +197,9 @@ def _index_page(rows: list[BatchRow], lang: str) -> str:
 <link rel="icon" href="data:,"><style>
 {style}
 .failed td{{color:var(--bad)}}
-.care td{{border-top:0;font-size:.85em;color:var(--soft)}} .care ul{{margin:0}} .care td:empty{{padding:0}}
-tr:has(+ .care) td{{border-bottom:0}}
+.care td{{font-size:.85em;color:var(--soft)}} .care ul{{margin:0;padding-left:1.2em}}
+tr:has(+ .care),tr:has(+ .care) td{{border-bottom:0}}
+@media screen and (max-width:38rem){{.care td{{display:block}} .care td:empty{{display:none}}}}
 td:nth-child(3) span{{white-space:nowrap}}
 </style></head><body><main>
 <h1>{html.escape(title)}</h1>

@@ -49,11 +49,13 @@ def experiment(material: Material) -> Section:
     return Section("experiment", words("section.experiment"), tuple(blocks))
 
 
-def equation(material: Material) -> Section:
-    """The equation of motion as it was solved, with its values."""
+def equation(material: Material) -> Section | None:
+    """The equation of motion as it was solved, with its values; None where no fit converged: it has none."""
     from toolkit.report.style import formula
 
     words, best = material.words, material.best
+    if not best.success:
+        return None
     blocks: list[Block] = [Paragraph(words("text.equation", model=model_name(words, best.model)))]
     if best.equation_latex:
         blocks.append(Equation(best.equation_latex, formula("equation", best.equation_latex)))

@@ -206,12 +206,14 @@ def cautions(material: Material) -> tuple[str, ...]:
     ]
     explained = material.explained
     poor = [words("answer.explains_little", percent=percent(explained))] if explained < _EXPLAINED else []
+    poor = poor if material.best.success else []  # no fit converged: the answers say so
     return tuple(poor + failed + notes(material))
 
 
 def notes(material: Material) -> list[str]:
     """What was noted about the record and about the preferred fit."""
-    told = (*material.analysis.series.meta.get("warnings", ()), *material.best.warnings)
+    of_fit = material.best.warnings if material.best.success else ()
+    told = (*material.analysis.series.meta.get("warnings", ()), *of_fit)
     return list(dict.fromkeys(say_whole(material.words, line) for line in told))
 
 
