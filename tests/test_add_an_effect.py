@@ -64,5 +64,17 @@ def test_its_sensitivities_come_with_it(table_magnet):
     np.testing.assert_allclose(solved.d_theta[:, 0], (far[0] - far[1]) / (2 * h), atol=1e-5)
 
 
+def test_the_contract_of_effects_takes_it_as_it_is(table_magnet, monkeypatch):
+    """As the guide says: nothing is listed for a new effect, no unit and no value either."""
+    import test_effects as contract
+
+    given = {f"table_magnet.{p.name}": contract.some_value(p) for p in table_magnet.parameters}
+    monkeypatch.setattr(contract, "VALUES", contract.VALUES | given)
+    contract.test_documented("table_magnet")
+    contract.test_dimensionally_consistent("table_magnet")
+    contract.test_stored_energy_belongs_to_the_torque("table_magnet")
+    contract.test_absent_effect_is_not_in_the_code("table_magnet")
+
+
 def test_without_the_file_there_is_no_such_effect():
     assert "table_magnet" not in effect_names()

@@ -15,9 +15,8 @@ from toolkit.registry import load_part
 
 ALL = effect_names()
 UNITS = {  # exponents of kg, m, s
-    "kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "1": (0, 0, 0), "rad": (0, 0, 0), "N": (1, 1, -2),
-    "N m": (1, 2, -2), "kg/s": (1, 0, -1), "kg/m": (1, -1, 0), "Hz": (0, 0, -1), "N/m": (1, 0, -2),
-    "m/s^2": (0, 1, -2), "kg/m^3": (1, -3, 0), "Pa s": (1, -1, -1),
+    "kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "1": (0, 0, 0), "rad": (0, 0, 0), "Hz": (0, 0, -1),
+    "N": (1, 1, -2), "J": (1, 2, -2), "W": (1, 2, -3), "Pa": (1, -1, -2),
 }  # fmt: skip
 SCENE_UNITS = {
     "mass_kg": "kg", "length_m": "m", "g_m_per_s2": "m/s^2", "bob_radius_m": "m", "fluid_density_kg_per_m3": "kg/m^3",
@@ -35,6 +34,37 @@ VALUES = {
 }  # fmt: skip
 
 
+def exponents(unit):
+    """Of kg, m, s in a unit such as `N m`, `kg/s` or `m/s^2`: one `/`, all after which divides. Raises KeyError for an unknown one."""
+    total = np.zeros(3)
+    for sign, part in zip((1, -1), unit.split("/")):
+        for factor in part.split():
+            name, _, power = factor.partition("^")
+            total += sign * int(power or 1) * np.array(UNITS[name])
+    return total
+
+
+def some_value(parameter):
+    """A value that the parameter may have, for an effect of which nothing stands in VALUES: its default, else one in its range."""
+    if parameter.default:
+        return parameter.default
+    low = -math.inf if parameter.minimum is None else parameter.minimum
+    high = math.inf if parameter.maximum is None else parameter.maximum
+    return (
+        0.05
+        if low < 0.05 < high
+        else 0.5 * (low + high)
+        if math.isfinite(low + high)
+        else low + 1
+        if low > 0.05
+        else high - 1
+    )
+
+
+for _name in ALL:
+    VALUES = {f"{_name}.{p.name}": some_value(p) for p in load_effect(_name).parameters} | VALUES
+
+
 def one(name):
     return build_equation([name], formulas={"formula": FORMULA})
 
@@ -50,7 +80,7 @@ def in_other_units(name, unit_kg, unit_m, unit_s):
         if full == "formula.b":  # N m s^1.5
             changed[full] = value * unit_kg * unit_m**2 * unit_s ** (-2 + 1.5)
         elif unit is not None:
-            kg, m, s = UNITS[unit]
+            kg, m, s = exponents(unit)
             changed[full] = value * unit_kg**kg * unit_m**m * unit_s**s
     return changed
 
@@ -64,7 +94,7 @@ def test_documented(name):
     assert len(effect.reference) > 5
     for p in effect.parameters:
         assert p.meaning
-        assert p.unit in UNITS
+        assert exponents(p.unit).shape == (3,)
         assert p.name == p.name.lower()
         assert p.minimum is None or p.default is None or p.minimum <= p.default
     assert set(effect.needs) <= set(SCENE_UNITS)
