@@ -39,9 +39,11 @@ from toolkit.render import stage
 
 # Which warnings (by the key of their sentence) are about which error.
 ABOUT: dict[str, frozenset[str]] = {
-    "position": frozenset({"track.strays", "track.few", "track.poor_picture", "track.apart", "track.never_both"}),
-    "zero": frozenset({"track.strays", "track.apart", "calibrate.wide", "track.grows"}),
-    "scale": frozenset({"track.strays", "track.apart", "calibrate.wide"}),
+    "position": frozenset(
+        {"track.strays", "track.few", "track.poor_picture", "track.apart", "track.never_both", "track.rival"}
+    ),
+    "zero": frozenset({"track.strays", "track.apart", "track.rival", "calibrate.wide", "track.grows"}),
+    "scale": frozenset({"track.strays", "track.apart", "track.rival", "calibrate.wide"}),
     "rest": frozenset({"track.strays", "track.grows", "track.clock_slips", "track.leaps", "video.backwards"}),
 }
 

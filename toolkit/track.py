@@ -18,6 +18,7 @@ from toolkit.progress import Progress, silent
 from toolkit.sentence import said
 from toolkit.trackers import load_tracker
 from toolkit.tracking.begin.acquire import REMEDY, find_bob, find_clear_bob
+from toolkit.tracking.begin.rival import rival_told
 from toolkit.tracking.clip.bars import ErrorBars
 from toolkit.tracking.clip.clock import (
     even_times,
@@ -410,6 +411,7 @@ def _finish(video: Video, follower: Follower, pivot: tuple[float, float] | None,
     followed_at, seen = places.t_s[follower.late :], good[follower.late :]
     warnings += poor_motion(motion, followed_at, seen, rms_px, typical, look.radius_px, shake.by_string)
     warnings += poor_picture(misfit, look.even, off_px, rms_px)
+    warnings += rival_told(follower.rival_px)
     for odd in clock_warnings(stamps, video):  # what the stamps account for affects no result
         (log if getattr(odd, "key", "") in _HARMLESS else warnings).append(odd)
 

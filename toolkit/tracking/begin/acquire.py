@@ -6,10 +6,13 @@ the still picture that the frames themselves show, and by its silhouette (a bob 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from toolkit.errors import JobError
 from toolkit.trackers.localiser import Look
+from toolkit.tracking.begin.rival import find_rival
 from toolkit.tracking.begin.search import Hypothesis, find_round_movers
 from toolkit.tracking.begin.trail import Rough, Stage, Trail, begin_trail, cut
 from toolkit.tracking.picture.plane import even_light, shrink, silhouette, still_picture
@@ -35,17 +38,7 @@ def find_clear_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: 
     best = _likeliest(batch, candidates, samples, radius, repeated)
     if best is None or not _is_clear(best, _ALL * (len(batch) - len(repeated))):
         return None
-    swing, size_px = best.swing, best.look.radius_px
-    span_s = batch[-1].t_s - batch[0].t_s
-    extent_px = np.hypot(*np.ptp(list(best.points.values()), axis=0))
-    if (
-        swing.values[4] <= 0
-        or span_s < _SWUNG * swing.period_s
-        or extent_px < 2 * size_px
-        or swing.rms_px > _CALM * size_px
-    ):
-        return None
-    return _in_best_sight(batch, best, radius, repeated)
+    return _in_best_sight(batch, best, radius, repeated) if _swings(batch, best) else None
 
 
 def find_bob(batch: list[Frame], bob: tuple[float, float] | None, radius: float | None, what: str) -> Rough:
@@ -107,7 +100,22 @@ def _likeliest(
         if rough is not None:
             roughs.append(rough)
     best = max(roughs, key=lambda rough: rough.score, default=None)
-    return best and next((rough for rough in roughs if _is_shadow_of(best, rough)), best)
+    if best is None:
+        return None
+    best = next((rough for rough in roughs if _is_shadow_of(best, rough)), best)
+    return replace(best, rival_px=find_rival(best, (rough for rough in roughs if _swings(batch, rough))))
+
+
+def _swings(batch: list[Frame], rough: Rough) -> bool:
+    """Do the frames show enough of its swing to know it?"""
+    swing, size_px = rough.swing, rough.look.radius_px
+    extent_px = np.hypot(*np.ptp(list(rough.points.values()), axis=0))
+    return bool(
+        swing.values[4] > 0
+        and batch[-1].t_s - batch[0].t_s >= _SWUNG * swing.period_s
+        and extent_px >= 2 * size_px
+        and swing.rms_px <= _CALM * size_px
+    )
 
 
 def _is_shadow_of(one: Rough, other: Rough) -> bool:
@@ -216,4 +224,6 @@ def _in_best_sight(batch: list[Frame], rough: Rough, radius: float | None, repea
     h = Hypothesis(0, *rough.points[start], rough.look.radius_px, 0, 1.0)
     trail = begin_trail(batch, start, h, sight, radius, repeated)
     other = None if trail is None else trail.follow(radius)
-    return other if other is not None and other.score > rough.score else rough
+    if other is None or other.score <= rough.score:
+        return rough
+    return replace(other, rival_px=rough.rival_px)

@@ -97,6 +97,7 @@ class Known:
         self.sight = rough.sight
         self.pivot = pivot
         self.swing = rough.swing
+        self.rival_px = rough.rival_px
         self.interval_s = float(np.median(np.diff([f.t_s for f in batch]))) or 1 / 30
         points = self._learn_stillness(batch, rough)
         self.shadow: Shadow | None = None

@@ -24,13 +24,15 @@ _LOOKED_AT = 6  # frames on which it is slow
 
 @dataclass(frozen=True)
 class Rough:
-    """A hypothesis that was followed: the bob's looks, its motion, centre by index of the frame, and a score."""
+    """A hypothesis that was followed: the bob's looks, its motion, centre by index of the frame, and a score; and where another thing
+    was seen that swings too."""
 
     look: Look
     swing: Swing
     points: dict[int, tuple[float, float]]
     score: float
     sight: Sight
+    rival_px: tuple[float, float] | None = None
 
     @property
     def clearness(self) -> float:
