@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 from test_search import disc, swinging
-from test_track import H, W, film
+from test_track import H, W, angles, film
 
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Guess, Look, Patch
@@ -210,3 +210,35 @@ def test_a_streak_that_shows_no_bob_says_nothing_of_the_exposure():
 
     seen = SimpleNamespace(x_px=np.linspace(100, 500, 10), fit_from_far=fitted)
     assert not _exposure(seen, Looks(bob), np.arange(10), 1 / 30, None, {})
+
+
+def lit_ball(x, y, radius):
+    """A ball lit from the left above, with a highlight: (share of each pixel, brightness)."""
+    rows, columns = np.mgrid[0:H, 0:W]
+    right, down = (columns - x) / radius, (rows - y) / radius
+    far = np.hypot(right, down)
+    near = np.sqrt(np.clip(1 - far**2, 0, 1))
+    lit = np.clip(-0.45 * right - 0.6 * down + 0.66 * near, 0, 1)
+    glint = np.clip(-0.25 * right - 0.33 * down + 0.91 * near, 0, 1) ** 30
+    return np.clip(radius * (1 - far) + 0.5, 0, 1), 40.0 + 40.0 * lit + 120.0 * glint
+
+
+def test_a_ball_with_a_highlight_that_is_nowhere_slow_draws_a_streak(tmp_path):
+    """At 15 frames a second with the shutter open for most of the time: what the streak leaves of the outline is no pattern."""
+    rng, fps, exposed = np.random.default_rng(7), 15.0, 0.8
+    t = np.arange(75) / fps
+    parts = (np.arange(9) + 0.5) / 9 - 0.5
+    fine = np.arange(t.size * 9) / (9 * fps)
+    theta = np.interp((t[:, None] + exposed * parts / fps).clip(0), fine, angles(1.6 * fine, 0.35))
+    x, y = 160 + 190 * np.sin(theta), 10 + 190 * np.cos(theta)
+    frames = []
+    for xs, ys in zip(x, y):
+        level = np.mean(
+            [190 + share * (shade - 190) for share, shade in (lit_ball(a, b, 14) for a, b in zip(xs, ys))], axis=0
+        )
+        frames.append(np.clip(level + rng.normal(0, 2, level.shape), 0, 255).astype(np.uint8))
+    found = track(film(tmp_path / "ball.mp4", frames, fps))
+    off = np.array([found.x_px - x[:, 4], found.y_px - y[:, 4]])[:, found.status == OK]
+    assert found.meta["exposure_s"] == pytest.approx(exposed / fps, rel=0.1)
+    assert (found.status == OK).mean() > 0.95
+    assert np.hypot(*off.std(axis=1)) < 0.7  # what the light does is about the same on all frames

@@ -15,6 +15,7 @@ _SURE, _GROWN_PX = 6.0, 0.4  # standard deviations, and over the whole swing: so
 _FEW = 3  # sightings: fewer tell no size on one side of the swing
 _BESIDE = 0.4  # of the radius: so far from where the bob was seen it is not
 _CLEAR = 2.0  # times the least misfit squared that any has
+_STREAKED = 0.9  # of the misfit, at most, is left where a streak is taken into account that is there
 _MANY = 4000  # pixels of a patch: a part of more tells its light as well
 # what `fit_disc` gives
 _RADIUS, _EDGE, _MISFIT, _VISIBLE, _CONTRAST, _WITHIN = 2, 3, 7, 8, 9, 13
@@ -92,6 +93,7 @@ def learn_looks(
     drawn = 0.05 * abs(look.contrast) + 1.5 * float(np.median(walls or [0.0]))  # more misfit than noise leaves
     found_px, learned = look.radius_px, Looks(look)
     clearest: dict[int, Clearest] = {}
+    patterned: Look | None = None
 
     def fitted(look: Look, sightings: np.ndarray) -> dict[int, np.ndarray]:
         near = ((int(k), grown(look, learned.growth, float(seen.x_px[k]))) for k in sightings)
@@ -110,22 +112,26 @@ def learn_looks(
     for turn in range(2):  # the streak widens the edge, the edge shortens the streak
         fits = sized(look)
         if look.even and (len(fits) < 3 or np.median([f[_WITHIN] for f in fits.values()]) > drawn):
-            patterned = look._replace(even=False)  # a pattern or a highlight: the outline alone counts
-            outlined = sized(patterned)
+            uneven = look._replace(even=False)  # a pattern or a highlight: the outline alone counts
+            outlined = sized(uneven)
             if len(fits) >= 3 or len(outlined) >= 3:
-                look, fits = patterned, outlined
+                look, fits = uneven, outlined
         if len(fits) < 3 and turn == 0:
             return None
         if len(fits) >= 3:
             look, growth = _size(look, fits, seen, radius)
             learned = Looks(look, learned.exposure_s, growth)
         if not look.even and look.noise > drawn:
-            return Looks(look._replace(radius_free=False))  # a pattern up to the outline: it tells no size, no streak
+            # a pattern up to the outline tells no size and no streak; but a bob that is nowhere slow draws one, which is none
+            if patterned is None and turn == 0 and np.median(speed[slow]) * interval_s > 1.0:
+                patterned = look
+            elif patterned is None or look.noise > _STREAKED * patterned.noise:
+                return Looks((patterned or look)._replace(radius_free=False))
         if speed.max() * interval_s < 1.0:
             break
         exposure_s = _exposure(seen, learned, fast, interval_s, learned.exposure_s if turn else None, clearest)
         if exposure_s is None:
-            break
+            return learned if patterned is None else Looks(patterned._replace(radius_free=False))
         learned = learned._replace(exposure_s=exposure_s)
     return learned
 
