@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from toolkit import UsageError
-from toolkit.output import whole_file, whole_folder
+from toolkit.output import try_folder, whole_file, whole_folder
 
 
 def test_a_folder_appears_whole_and_leaves_other_files_alone(tmp_path):
@@ -49,3 +49,17 @@ def test_a_file_where_a_folder_should_be(tmp_path):
         pass
     with pytest.raises(UsageError, match="is a folder"), whole_file(tmp_path):
         pass
+
+
+def test_a_folder_is_tried_before_long_work(tmp_path):
+    try_folder(tmp_path / "new" / "out")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("taken")
+    with pytest.raises(UsageError, match="is a file"):
+        try_folder(tmp_path / "file")
+
+
+def test_a_folder_is_not_written_over_by_a_file(tmp_path):
+    (tmp_path / "taken.mp4").mkdir()
+    with pytest.raises(UsageError, match="is a folder"), whole_folder(tmp_path) as unfinished:
+        (unfinished / "taken.mp4").write_text("film")

@@ -50,6 +50,7 @@ def analyse_folder(
     """
     from joblib import Parallel, cpu_count, delayed
 
+    from toolkit.output import try_folder
     from toolkit.report import check_choice
 
     folder, out = Path(folder), Path(out)
@@ -63,6 +64,7 @@ def analyse_folder(
     recordings.sort(key=_as_people_count)
     if not recordings:
         raise JobError(f"{folder} holds no video and no θ(t) file; known endings are .mp4 .mov .avi … .csv .txt .trk")
+    try_folder(out)
     tasks = (
         delayed(_analyse_one)(path, out / name, scene or Scene(), lang, formats)
         for path, name in zip(recordings, _distinct_names(recordings))

@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from toolkit.errors import UsageError
@@ -43,6 +43,16 @@ def whole_folder(folder: str | Path) -> Iterator[Path]:
                     made.rmdir()
                 except OSError:
                     break
+
+
+class _OnlyTried(Exception):
+    pass
+
+
+def try_folder(folder: str | Path) -> None:
+    """Raise UsageError where `whole_folder` would, before long work is done for it; nothing of the attempt remains."""
+    with suppress(_OnlyTried), whole_folder(folder):
+        raise _OnlyTried
 
 
 def _move_all(source: Path, target: Path) -> None:

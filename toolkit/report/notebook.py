@@ -110,7 +110,8 @@ def finding_html(finding: Finding, lang: str = "en") -> str:
     title = assumption(words, finding)
     tone = _TONES.get(finding.verdict, "#5b6270")
     label = f'<b style="color:{tone}">{escape(words(f"verdict.{finding.verdict}"))}</b>'
-    return f"<div><b>{marked(title)}</b>: {label}. {marked(sentence(words, finding))} <i>{marked(remedy(words, finding))}</i></div>"
+    label = words("language.sentence", text=label)
+    return f"<div><b>{marked(title)}</b>: {label} {marked(sentence(words, finding))} <i>{marked(remedy(words, finding))}</i></div>"
 
 
 def analysis_html(analysis: Analysis, lang: str = "en") -> str:

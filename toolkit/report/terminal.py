@@ -29,8 +29,8 @@ def summary_lines(analysis: Analysis, lang: str = "en", width: int | None = None
         told.append(f"{fact.question}  {fact.answer}" + (f"  ({fact.remark})" if fact.remark else ""))
     for finding in analysis.findings:
         if finding.assumption in MAIN:
-            verdict = words(f"verdict.{finding.verdict}")
-            text = f"{assumption(words, finding)}: {verdict}. {sentence(words, finding)} {remedy(words, finding)}"
+            verdict = words("language.sentence", text=words(f"verdict.{finding.verdict}"))
+            text = f"{assumption(words, finding)}: {verdict} {sentence(words, finding)} {remedy(words, finding)}"
             told.append(text.rstrip())
     told += [f"{words('page.note')}: {line}" for line in cautions(material)]
     cells = width or min(_WIDEST, shutil.get_terminal_size((_WIDEST, 24)).columns)
