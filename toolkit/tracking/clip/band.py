@@ -3,6 +3,7 @@ motion that is not known well."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -31,10 +32,12 @@ class Beyond(NamedTuple):
 
     def mixes(self, variances: np.ndarray) -> np.ndarray:
         """What they leave in each value of it: (n, k) for (n, k)."""
-        mixed = np.empty_like(variances)
-        for span, q in self.pieces:
-            mixed[span] = (np.eye(len(q)) - q @ q.T) ** 2 @ variances[span]
-        return mixed
+        return self.mixing()(variances)
+
+    def mixing(self) -> Callable[[np.ndarray], np.ndarray]:
+        """The same, to be used again and again."""
+        shares = [(span, (np.eye(len(q)) - q @ q.T) ** 2) for span, q in self.pieces]
+        return lambda variances: np.concatenate([share @ variances[span] for span, share in shares])
 
 
 def beyond_band(t_s: np.ndarray, series: np.ndarray, unit: np.ndarray) -> Beyond:

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from toolkit.tracking.clip.band import beyond_band
-from toolkit.tracking.clip.picture_type import factors_of_types
 from toolkit.tracking.clip.places import Places
-from toolkit.tracking.clip.scatter import Factors, quick_sigma, tamed, true_sigma
+from toolkit.tracking.clip.scatter import Factors, late_px, quick_sigma, tamed, true_sigma
 from toolkit.tracking.clip.shake import Shake
+from toolkit.tracking.clip.unalike import relative_sigma, traits
 
 
 class ErrorBars(NamedTuple):
@@ -35,6 +35,7 @@ class Bars:
         time_sigma_s: float,
         unsteady_px: float,
         slow_px: float,
+        even: bool = True,
     ) -> None:
         self.places, self.shake = places, shake
         good = places.good
@@ -42,7 +43,9 @@ class Bars:
         self.own = np.array([places.sigma_x_px, places.sigma_y_px])[:, good]
         self.shaken = np.array([shake.x, shake.y])[:, good]
         self.shake_sigma = shake.sigma[good]
-        self.kind = None if places.kind is None else places.kind[good]
+        kind, misfit = (None if part is None else part[good] for part in (places.kind, places.misfit))
+        uneven = None if even else np.sqrt(self.own[0] * self.own[1])
+        self.traits = traits(kind, misfit, uneven, np.array([places.x_px, places.y_px])[:, good], self.velocity)
         self.time_sigma_s, self.unsteady_px, self.slow_px = time_sigma_s, unsteady_px, slow_px
 
     def about(self, x_px: np.ndarray, y_px: np.ndarray, rough: bool = False, full: bool = False) -> ErrorBars:
@@ -51,10 +54,10 @@ class Bars:
         good = self.places.good
         rest = np.array([self.places.x_px - x_px, self.places.y_px - y_px])[:, good]
         factors = self._factors(rest, self.own, rough, full)
-        of_type = np.ones(self.places.t_s.size)
-        if not rough and self.kind is not None and np.ptp(self.kind) > 0:
-            of_type[good] = self._of_types(rest, factors)
-            sigma = self.own * of_type[good]
+        unalike = np.ones(self.places.t_s.size)
+        if not rough:
+            unalike[good] = self._unalike(rest, factors)
+            sigma = self.own * unalike[good]
             if factors.wholly and not self.time_sigma_s:  # of the residuals only their mean square is another
                 x, y = (_rms(tamed(r / s)) / _rms(tamed(r / o)) for r, s, o in zip(rest, sigma, self.own))
                 factors = factors._replace(x=factors.x * x, y=factors.y * y)
@@ -64,8 +67,8 @@ class Bars:
             factors.x,
             factors.y,
             factors.shake_px,
-            self.places.sigma_x_px * factors.x * of_type,
-            self.places.sigma_y_px * factors.y * of_type,
+            self.places.sigma_x_px * factors.x * unalike,
+            self.places.sigma_y_px * factors.y * unalike,
         )
 
     def _factors(self, rest: np.ndarray, own: np.ndarray, rough: bool = False, full: bool = False) -> Factors:
@@ -93,24 +96,30 @@ class Bars:
             left_px = float(np.sqrt(max(left, 0.0)))
         return Factors(x, y, left_px)
 
-    def _of_types(self, rest: np.ndarray, factors: Factors) -> np.ndarray:
-        """What σ (n,) of pictures of different types are to be multiplied by."""
-        assert self.kind is not None
+    def _unalike(self, rest: np.ndarray, factors: Factors) -> np.ndarray:
+        """What σ (n,) of frames of different traits are to be multiplied by."""
         sigma = self.own * [[factors.x], [factors.y]]
-        member = (self.kind[:, None] == np.unique(self.kind)).astype(float)
         if factors.wholly:  # across the motion no clock errs
             ux, uy = self.velocity / (np.hypot(*self.velocity) + 1e-9)
             turned = np.array([[ux, uy], [uy, -ux]])
             variance = np.einsum("ijn,jn->in", turned**2, sigma**2)
             late = np.einsum("ijn,jn->in", turned, self.velocity * self.time_sigma_s) ** 2 / variance
             squares = np.array([tamed(r) for r in np.einsum("ijn,jn->in", turned, rest) / np.sqrt(variance)]) ** 2
-            return factors_of_types(self.kind, squares.ravel(), np.tile(member, (2, 1)), late.ravel(), squares.size)
+            return relative_sigma(
+                self.traits, squares.ravel(), lambda v: np.tile(v, (2, 1)), late.ravel(), squares.size
+            )
         unit = np.sqrt(sigma[0] * sigma[1])
         beyond = beyond_band(self.t_s, rest + self.shaken, unit)
-        own = [beyond.mixes((s / unit)[:, None] ** 2 * member) for s in sigma]
-        known = beyond.mixes((self.velocity * self.time_sigma_s / unit).T ** 2).T
+        mixing = beyond.mixing()
+        own = (sigma / unit) ** 2
+        late = late_px(self.t_s, self.velocity, rest + self.shaken - unit * beyond.rest, self.time_sigma_s)
+        known = mixing((late / unit).T ** 2).T
         squares = np.array([tamed(r) for r in beyond.rest]) ** 2
-        return factors_of_types(self.kind, squares.ravel(), np.concatenate(own), known.ravel(), 2 * beyond.left)
+
+        def spread(v: np.ndarray) -> np.ndarray:
+            return np.concatenate([mixing(o[:, None] * v) for o in own])
+
+        return relative_sigma(self.traits, squares.ravel(), spread, known.ravel(), 2 * beyond.left)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -58,7 +58,7 @@ def fit_jointly(
     late_x, late_y = np.hypot(velocity * time_sigma_s, shake.sigma)
     slow_px = (_EVEN if camera.even else _UNEVEN) * camera.off_px
     unsteady_px = min(shake.unseen_px, np.inf if lines is None else lines.apart_px)
-    bars = Bars(places, shake, velocity, time_sigma_s, unsteady_px, slow_px)
+    bars = Bars(places, shake, velocity, time_sigma_s, unsteady_px, slow_px, camera.even)
     start = swing.values_at(t[good][0], camera.fps_factor)
     when = t / camera.fps_factor
     mx, my = swing.position(t)

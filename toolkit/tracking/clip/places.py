@@ -15,7 +15,8 @@ class Places:
 
     t_s : when, the first frame used at 0.    x_px, y_px, sigma_x_px, sigma_y_px : the places, and the localiser's own σ of
     them.    good : bool, on which frames they are believed.    repeated : bool, pictures that are those before them again.
-    kind : int, of picture, as the codec coded it (`Frame`); None where that is not known.
+    kind : int, of picture, as the codec coded it (`Frame`).    misfit : what the localiser left unexplained of the picture (rms,
+    grey levels). Both None where that is not known.
     """
 
     t_s: np.ndarray
@@ -26,12 +27,13 @@ class Places:
     good: np.ndarray
     repeated: np.ndarray
     kind: np.ndarray | None = None
+    misfit: np.ndarray | None = None
 
     @classmethod
     def of(cls, record: Record, t_s: np.ndarray) -> Places:
         """Those of a record, at times t_s (n,)."""
-        x, y, sx, sy = np.array([p[:4] for p in record.place], float).T
-        return cls(t_s, x, y, sx, sy, np.array(record.ok), np.array(record.repeated), np.array(record.kind))
+        x, y, sx, sy, misfit = np.array([p[:5] for p in record.place], float).T
+        return cls(t_s, x, y, sx, sy, np.array(record.ok), np.array(record.repeated), np.array(record.kind), misfit)
 
     def without(self, frames: np.ndarray) -> Places:
         """The same with these frames (n,) bool not believed, and no place or σ where none is."""

@@ -84,7 +84,7 @@ def true_sigma(
             found.append(_CARRIED**2 * quick if quick < _MOST**2 else np.nan)
     count, beside_clock = r.size / _COUNT, bool(time_sigma_s and wholly[2])
     if not (rough or beside_clock or (wholly[0] and wholly[1])):
-        count, quick_squares = _beyond(t_s, np.array([rx, ry]), all_s[:2], np.hypot(clock[:2], shake_px))
+        count, quick_squares = _beyond(t_s, np.array([rx, ry]), all_s[:2], np.array([vx, vy]), time_sigma_s, shake_px)
         found[:2] = [f if all_of_it else q for f, q, all_of_it in zip(found, quick_squares, wholly)]
     own = found[2] if np.isfinite(found[2]) else _USUAL**2
     # the rest is the clock's
@@ -107,26 +107,58 @@ def quick_sigma(
     t_s: np.ndarray, r: np.ndarray, s: np.ndarray, velocity: np.ndarray, time_sigma_s: float
 ) -> tuple[float, float]:
     """The factors of both axes as far as what changes from frame to frame tells them, for residuals r of the localiser's σ s, all (2, n),
-    beside whatever is slow, and a clock."""
-    count, (x, y) = _beyond(t_s, r, s, velocity * time_sigma_s)
-    ways = np.mean(velocity**2, axis=1) / np.mean(np.sum(velocity**2, axis=0))
-    more = _MORE * float(ways[0] - ways[1])
-    if np.isfinite(x) and np.isfinite(y):
-        x, y = _alike(x, y, count, more)
-    elif not np.isfinite(y):
-        x, y = (x, x * np.exp(-2 * more)) if np.isfinite(x) else (_USUAL**2, _USUAL**2)
+    beside whatever is slow, and a clock. Beside that one they are told along the bob's `velocity`, where the clock errs most, and
+    across it, where only a shake makes it err."""
+    share = np.mean(velocity**2, axis=1) / np.mean(np.sum(velocity**2, axis=0))
+    if not time_sigma_s:
+        count, (x, y) = _beyond(t_s, r, s, velocity, 0.0)
+        x, y = _both(x, y, count, _MORE * float(share[0] - share[1]))
     else:
-        x = y * np.exp(2 * more)
+        way = velocity / (np.hypot(*velocity) + 1e-9)
+        way *= np.where(way[np.argmax(share)] < 0, -1, 1)  # to one side, whether the bob goes there or comes
+        turns = np.array([way, [-way[1], way[0]]])
+        turned, own, moved = (
+            np.sum(turns * r, axis=1),
+            np.sqrt(np.sum((turns * s) ** 2, axis=1)),
+            np.sum(turns * velocity, axis=1),
+        )
+        count, (along, across) = _beyond(t_s, turned, own, moved, time_sigma_s)
+        along, across = _both(along, across, count, _MORE)
+        x, y = share * along + share[::-1] * across
     return max(float(np.sqrt(x)), _LEAST), max(float(np.sqrt(y)), _LEAST)
 
 
-def _beyond(t_s: np.ndarray, r: np.ndarray, s: np.ndarray, known: np.ndarray) -> tuple[float, list[float]]:
-    """How many independent values tell of what is quicker than whatever is slow in residuals r of the localiser's σ s beside errors `known`,
-    all (2, n), and the squares of the factors that make it the localiser's; NaN where that cannot be told."""
+def late_px(t_s: np.ndarray, velocity: np.ndarray, slow: np.ndarray, time_sigma_s: float) -> np.ndarray:
+    """How far (standard deviation) a clock moves the bob in the picture, beside what is slow in its residuals, all (2, n): a shake
+    moves it too."""
+    return np.asarray(time_sigma_s * (velocity + np.gradient(slow, axis=1) / np.maximum(np.gradient(t_s), 1e-3)))
+
+
+def _both(one: float, other: float, count: float, more: float) -> tuple[float, float]:
+    """The squares of two factors, of which the first is ordinarily `more` (logarithm) than the other: each told by so many
+    values, or (NaN) not at all."""
+    if np.isfinite(one) and np.isfinite(other):
+        return _alike(one, other, count, more)
+    if np.isfinite(one):
+        return one, float(one * np.exp(-2 * more))
+    return (float(other * np.exp(2 * more)), other) if np.isfinite(other) else (_USUAL**2, _USUAL**2)
+
+
+def _beyond(
+    t_s: np.ndarray,
+    r: np.ndarray,
+    s: np.ndarray,
+    velocity: np.ndarray,
+    time_sigma_s: float,
+    known: np.ndarray | float = 0.0,
+) -> tuple[float, list[float]]:
+    """How many independent values tell of what is quicker than whatever is slow in residuals r of the localiser's σ s beside a clock and
+    errors `known`, all (2, n), and the squares of the factors that make it the localiser's; NaN where that cannot be told."""
     unit = np.sqrt(s[0] * s[1])
     beyond = beyond_band(t_s, r, unit)
     squares = np.sum(beyond.rest**2, axis=1)
-    told = np.array([_less(a, b) for a, b in zip(squares, beyond.holds((known / unit) ** 2))])
+    late = late_px(t_s, velocity, r - unit * beyond.rest, time_sigma_s) if time_sigma_s else np.zeros_like(r)
+    told = np.array([_less(a, b) for a, b in zip(squares, beyond.holds((late**2 + known**2) / unit**2))])
     told *= _CARRIED**2 / beyond.holds((s / unit) ** 2)
     return float(beyond.left), [f if f < _MOST**2 else np.nan for f in told.tolist()]
 

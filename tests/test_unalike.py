@@ -1,4 +1,4 @@
-"""Error bars of pictures that a codec coded in different ways, against scatter made up here and a film whose truth is known."""
+"""Error bars of frames on which the bob is found better or worse, against scatter made up here and films whose truth is known."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from toolkit.tracking.clip.bars import Bars
-from toolkit.tracking.clip.picture_type import factors_of_types
 from toolkit.tracking.clip.places import Places
+from toolkit.tracking.clip.unalike import relative_sigma, traits
 
 N = 480
 T = np.arange(N) / 60
@@ -34,11 +34,11 @@ class Taken(NoShake):
     sigma = np.full(N, 0.1)
 
 
-def bars(error, kind=KIND, shake=NoShake, time_sigma_s=0.0):
-    """Of places with these errors (2, n) whose localiser states 0.02 px."""
-    one, yes = np.full(N, 0.02), np.ones(N, bool)
-    places = Places(T, *(MOTION + error), one, one, yes, ~yes, kind)
-    return Bars(places, shake(), VELOCITY, time_sigma_s, 0.01, 0.1).about(*MOTION)
+def bars(error, kind=KIND, shake=NoShake, time_sigma_s=0.0, misfit=None, own=0.02, even=True):
+    """Of places with these errors (2, n) whose localiser states 0.02 px, or its `own`."""
+    one, yes = np.full(N, own), np.ones(N, bool)
+    places = Places(T, *(MOTION + error), one, one, yes, ~yes, kind, misfit)
+    return Bars(places, shake(), VELOCITY, time_sigma_s, 0.01, 0.1, even).about(*MOTION)
 
 
 def stds(found, error, kind=KIND):
@@ -80,19 +80,93 @@ def test_pictures_of_one_type_or_of_none_known_are_left_as_they_are():
         assert np.array_equal(found.sigma_y_px, plain.sigma_y_px)
 
 
+def alike_in(ratio, parts):
+    """The mean square of error/σ (2, n), pooled over seeds, on each part of the frames over that on all: the roots."""
+    square = np.mean(np.square(ratio), axis=(0, 1))
+    return [float(np.sqrt(square[part].mean() / square.mean())) for part in parts]
+
+
+def ratios(truth, seeds=8, **given):
+    """error/σ (seeds, 2, n) of errors of this true σ (n,)."""
+    found = []
+    for seed in range(seeds):
+        error = truth * np.random.default_rng(seed).normal(size=(2, N))
+        told = bars(error, **given)
+        found.append(error / [told.sigma_x_px, told.sigma_y_px])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("beside", ["nothing", "shake"])
+def test_a_codecs_coarse_pictures_have_larger_error_bars_though_less_of_them_is_unexplained(beside):
+    rng = np.random.default_rng(3)
+    misfit = 2.0 * np.exp(rng.uniform(-0.2, 0.2, N))
+    stated = 0.01 * misfit  # a fit's σ goes with what it leaves unexplained
+    truth = 0.03 * TRUE * (2.0 / misfit)
+    shake = NoShake if beside == "nothing" else Taken
+    ratio = ratios(truth, misfit=misfit, own=stated, shake=shake)
+    halves = misfit < np.median(misfit), misfit >= np.median(misfit)
+    assert alike_in(ratio, halves) == pytest.approx([1.0, 1.0], abs=0.07)
+    plain = ratios(truth, own=stated, shake=shake)
+    assert alike_in(plain, halves)[0] > 1.12
+
+
+def test_a_codec_that_codes_each_picture_by_itself_leaves_the_misfit_its_word():
+    misfit = 2.0 * np.exp(np.random.default_rng(3).uniform(-0.2, 0.2, N))
+    ratio = ratios(0.015 * misfit, misfit=misfit, own=0.01 * misfit, kind=np.ones(N, int))
+    assert alike_in(ratio, [misfit < 1.9, misfit > 2.1]) == pytest.approx([1.0, 1.0], abs=0.07)
+
+
+@pytest.mark.parametrize("where", ["fast", "aside"])
+def test_error_bars_are_larger_where_the_bob_is_found_worse(where):
+    fast, right = np.hypot(*VELOCITY) > 700, MOTION[0] > 0
+    part = fast if where == "fast" else right
+    truth = np.where(part, 0.04, 0.03)
+    ratio = ratios(truth, kind=None)
+    assert alike_in(ratio, [part, ~part]) == pytest.approx([1.0, 1.0], abs=0.06)
+    stated = 0.03 * np.random.default_rng(0).normal(size=(2, N))
+    even = bars(stated, kind=None)
+    assert np.ptp(even.sigma_x_px) < 0.2 * np.mean(even.sigma_x_px)  # and hardly, where it is not
+
+
+def test_the_error_bars_of_an_outline_are_as_unlike_as_its_errors_are():
+    """And no more, though its likelihood was steep on one frame and flat on another."""
+    steep = np.exp(0.7 * np.random.default_rng(5).normal(size=N))
+    ratio = ratios(np.full(N, 0.2), own=0.02 * steep, kind=None, even=False)
+    thirds = np.split(np.argsort(steep), 3)
+    assert alike_in(ratio, thirds) == pytest.approx([1.0, 1.0, 1.0], abs=0.25)
+    true = ratios(0.1 * steep, own=0.02 * steep, kind=None, even=False)
+    assert alike_in(true, thirds) == pytest.approx([1.0, 1.0, 1.0], abs=0.1)
+
+
+def test_a_clock_beside_a_shake_is_not_the_localisers():
+    """Stamps in whole milliseconds: they err along the motion, and across it as fast as the hand moves."""
+    found = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        error, late = 0.03 * rng.normal(size=(2, N)), rng.uniform(-5e-4, 5e-4, N)
+        seen, taken = (np.array([0 * T, 2 * np.sin(2 * np.pi * 4 * t)]) for t in (T + late, T))
+        hand = type("Hand", (Taken,), {"x": taken[0], "y": taken[1]})
+        told = bars(error + VELOCITY * late + seen - taken, None, hand, time_sigma_s=1e-3 / np.sqrt(12))
+        found.append((told.x / 1.5, told.y / 1.5))
+    # a codec's errors are taken to be carried on, and to be larger along the motion
+    assert np.mean(found, axis=0) == pytest.approx([1.06 * np.exp(0.12), 1.06], abs=0.06)
+    assert np.std(found, axis=0).max() < 0.1
+
+
 def test_types_of_which_there_are_few_pictures_are_drawn_towards_what_is_usual():
     rng = np.random.default_rng(1)
     kind = np.full(200, 2)
     kind[:2] = 1
-    own = (kind[:, None] == [1, 2]).astype(float)
-    ratios = []
+    t = np.arange(200) / 60
+    told_by = traits(kind, None, None, np.array([np.sin(5 * t), 0 * t]), np.array([np.cos(5 * t), 0 * t]))
+    apart = []
     for _ in range(300):
         squares = rng.normal(size=200) ** 2
-        found = factors_of_types(kind, squares, own, np.zeros(200), 200)
-        ratios.append(found[0] / found[-1])
+        found = relative_sigma(told_by, squares, lambda v: v, np.zeros(200), 200)
+        apart.append(np.log(found[0] / found[-1]))
     alone = np.std([np.log(np.sqrt(np.mean(rng.normal(size=2) ** 2))) for _ in range(300)])
-    assert np.std(np.log(ratios)) < 0.7 * alone
-    assert 1 / 1.4 < np.exp(np.mean(np.log(ratios))) < 1.0
+    assert np.std(apart) < 0.7 * alone
+    assert 1 / 1.9 < np.exp(np.mean(apart)) < 1.0
 
 
 def filmed(path, **camera):
