@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from toolkit.report.plain_math import plain_math
+
 
 def describe_effects() -> str:
-    """Every effect with its equation of motion (LaTeX), parameters with units and ranges, validity and reference."""
+    """Every effect with its equation of motion, parameters with units and ranges, validity and reference."""
     from toolkit.effects import effect_names, load_effect
     from toolkit.motion import build_equation
 
@@ -14,7 +16,11 @@ def describe_effects() -> str:
     for name in effect_names():
         effect = load_effect(name)
         formulas = {"formula": "-k*omega"} if name == "formula" else {}
-        lines = [name, f"  {effect.meaning}", f"  equation    {build_equation((name,), formulas=formulas).latex}"]
+        lines = [
+            name,
+            f"  {effect.meaning}",
+            f"  equation    {plain_math(build_equation((name,), formulas=formulas).latex)}",
+        ]
         lines += [f"  {p.name} [{p.unit}]  {p.meaning}{_range(p)}" for p in effect.parameters]
         if effect.needs:
             lines.append(f"  needs       {', '.join(effect.needs)}")
@@ -37,7 +43,7 @@ def describe_camera_effects() -> str:
 
 
 def describe_models() -> str:
-    """Every model with its equation (LaTeX) and what is fitted; those that a report fits by itself are marked."""
+    """Every model with its equation and what is fitted; those that a report fits by itself are marked."""
     from toolkit.models import STANDARD, load_model, model_names
 
     blocks = []
@@ -46,7 +52,12 @@ def describe_models() -> str:
         mark = " (in every report)" if name in STANDARD else ""
         fitted = ", ".join((*model.coefficients, "theta0", "phi", "omega_g", "theta_offset"))
         blocks.append(
-            [f"{name}{mark}", f"  {model.summary}", f"  equation    {model.latex}", f"  fitted      {fitted}"]
+            [
+                f"{name}{mark}",
+                f"  {model.summary}",
+                f"  equation    {plain_math(model.latex)}",
+                f"  fitted      {fitted}",
+            ]
         )
     note = (
         "alpha_d = k_d/(2m) [1/s], beta = c l/m [1], mu = torque/(m l^2) [1/s2]; with mass and length known the\n"
