@@ -21,22 +21,22 @@ def covered(x, y, radius, edge, shape):
     return ndtr((radius - np.hypot(columns - x, rows - y)) / edge)
 
 
-def picture(x, y, wall, shadow, rng, edge=0.7):
+def picture(x, y, wall, shadow, rng, edge=0.7, shade=70.0, noise=1.5):
     bob = covered(x, y, 12.0, edge, wall.shape)
     if shadow is not None:
         right, down, radius, soft, strength = shadow
         wall = wall * (1 - strength * covered(x + right, y + down, radius, soft, wall.shape))
-    return (wall * (1 - bob) + 70.0 * bob + rng.normal(0, 1.5, wall.shape)).astype(np.float32)
+    return (wall * (1 - bob) + shade * bob + rng.normal(0, noise, wall.shape)).astype(np.float32)
 
 
-def seen(shadow, off=(0.0, 0.0)):
+def seen(shadow, off=(0.0, 0.0), **bob):
     """Patches of a bob that is taken to be `off` px from where it is, before a wall with a slope."""
     rng = np.random.default_rng(5)
     wall = 170 + 0.2 * np.arange(110)[None, :] * np.ones((110, 1)).astype(np.float32)
     found = []
     for _ in range(8):
         x, y = rng.uniform(48, 60, 2)
-        shown = picture(x, y, wall, shadow, rng)
+        shown = picture(x, y, wall, shadow, rng, **bob)
         patch = Patch(shown, wall.astype(np.float32), np.full(wall.shape, 9.0, np.float32), 0.0, 0.0)
         found.append((patch, Guess(x + off[0], y + off[1], string_rad=-1.6)))
     return found
@@ -57,6 +57,46 @@ def test_a_faint_shadow_that_hardly_shows_beside_an_even_bob_is_found():
     found = find_shadow(seen(shadow, (0.05 * shadow[0], 0.05 * shadow[1])), Look(12.4, 1.2, -98.0, 3.0))
     assert found is not None
     assert np.hypot(found.x_px + 0.05 * shadow[0], found.y_px + 0.05 * shadow[1]) < 0.1
+
+
+def test_a_shadow_hardly_beside_a_soft_bob_is_found():
+    """Nothing is dark beside it but a narrow rim, and the disc fits so well that only where it does not tells."""
+    shadow = (-3.9, 0.8, 12.0, 2.2, 0.17)
+    off = (0.25 * shadow[0], 0.25 * shadow[1])
+    found = find_shadow(seen(shadow, off, edge=1.7, shade=130.0, noise=0.5), Look(12.6, 2.0, -42.0, 1.3))
+    assert found is not None
+    assert np.hypot(found.x_px + off[0], found.y_px + off[1]) < 0.25  # was 1 px
+    assert found.radius_px == pytest.approx(12.0, abs=0.3)
+
+
+def test_a_soft_shadow_close_behind_a_bob_is_found():
+    shadow = (0.5, 2.2, 12.0, 3.5, 0.4)
+    found = find_shadow(seen(shadow, (0.1, 0.5), shade=110.0), Look(12.6, 1.4, -62.0, 7.0))
+    assert found is not None
+    assert np.hypot(found.x_px + 0.1, found.y_px + 0.5) < 0.15
+
+
+def test_a_shadow_in_the_light_of_a_large_lamp_is_found():
+    """No disc is left in it: it is as soft as the bob is large."""
+    shown = []
+    for patch, guess in seen(None):
+        down, right = np.mgrid[0:110, 0:110] - np.array([guess.y_px, guess.x_px])[:, None, None]
+        light = 1 - 0.4 * np.exp(-0.5 * ((right - 16) ** 2 + (down - 11) ** 2) / 9.0**2)
+        behind = 1 - covered(guess.x_px, guess.y_px, 12.0, 0.7, light.shape)
+        shown.append((patch._replace(image=patch.image - (1 - light) * patch.back * behind), guess))
+    found = find_shadow(shown, Look(12.2, 0.7, -98.0, 3.0))
+    assert found is not None
+    assert np.hypot(found.shadow.right_px - 16, found.shadow.down_px - 11) < 0.5
+    assert np.hypot(found.x_px, found.y_px) < 0.1
+
+
+def test_a_shadow_and_its_bob_taken_for_one_are_told_apart():
+    shadow, off = (-6.0, 10.5, 12.0, 2.0, 0.4), (-9.3, 1.2)
+    found = find_shadow(seen(shadow, off, shade=105.0), Look(20.0, 2.4, -48.0, 14.0, even=False))
+    assert found is not None
+    assert np.all(np.abs(np.subtract(found.shadow, shadow)) < [0.5, 0.5, 0.5, 0.5, 0.03])
+    assert np.hypot(found.x_px + off[0], found.y_px + off[1]) < 0.1
+    assert found.radius_px == pytest.approx(12.0, abs=0.1)
 
 
 def test_a_shadow_taken_for_the_lower_half_of_the_bob_is_found():

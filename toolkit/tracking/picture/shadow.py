@@ -20,8 +20,13 @@ _SHADOWY_PX = 1.2  # a sharper edge is no shadow's
 _MOVES, _STRIDE_PX = 4, 2.0  # so often each patch is moved, by so much at most
 # of the values of `_model`
 _STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3, 1e-5, 1e-3, 1e-3])
-# share of light that is missed beside the bob wherever a shadow is looked for: beside an even bob, and one with a pattern
-_DARK, _DARK_UNEVEN = 0.02, 0.04
+# where a shadow is looked for: how far away, how large the bob and it may be (in radii of what was taken for the bob), and how much of
+# the way to it what was taken for the bob lies
+_ABOUT_BOB = ((0.5, 1.0, 0.2), (1.3, 1.0, 0.2))
+_TAKEN_FOR_ONE = (0.6, 0.6, 0.5)
+# what the bob alone leaves is compared between parts of the picture: rings about it, of so many radii, in eight directions each
+_RINGS = (0.5, 0.8, 0.95, 1.05, 1.25, 1.6, 2.2)
+_UNEXPLAINED = 8.0  # times the scatter within such parts: more between them, and there is something beside the bob
 
 
 class Shadow(NamedTuple):
@@ -81,17 +86,19 @@ class Shaded(NamedTuple):
 def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
     """The shadow beside the bob, by what is fitted to patches on which the bob is slow (each with the guess at its centre).
     None where the bob alone explains them nearly as well."""
-    u, v, image, back, beside, which = _pixels(seen, look)
-    unlike = look.noise > 0.02 * abs(look.contrast) + 2.5  # a shadow that overlaps the bob is fitted as a part of it
-    if u.size < 200 or not (unlike or _light_is_missed(u, v, image, back, beside, look)):
+    u, v, image, back, which = _pixels(seen, look)
+    if u.size < 200:
         return None
-    found = _beside_even(u, v, image, back, which, look)
+    alone = _fit(u, v, image, back, _alone(image, back, look), range(8), 12)
+    if look.even and _unexplained(u, v, image - _model(alone[0], u, v, back), look.radius_px) < _UNEXPLAINED:
+        return None
+    found = _beside_even(u, v, image, back, which, look, alone)
     return found or (_beside_patterned(u, v, image, back, look) if look.even else None)
 
 
 def find_shadow_near(seen: list[tuple[Patch, Guess]], look: Look, about: Shaded) -> Shaded | None:
     """The shadow found before from places that it had drawn aside, and the bob; from patches at better places."""
-    u, v, image, back, *_ = _pixels(seen, look)
+    u, v, image, back, _ = _pixels(seen, look)
     shadow = about.shadow
     bob = about.radius_px, about.edge_px, np.median(back) + about.contrast
     start = np.array(
@@ -139,26 +146,29 @@ def _fit_in_place(
 
 
 def _beside_even(
-    u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, which: np.ndarray, look: Look
+    u: np.ndarray,
+    v: np.ndarray,
+    image: np.ndarray,
+    back: np.ndarray,
+    which: np.ndarray,
+    look: Look,
+    alone: tuple[np.ndarray, float],
 ) -> Shaded | None:
-    """By a disc and a soft darker disc behind it."""
-    contrast = look.contrast or float(np.median(image) - np.median(back))
-    size = look.radius_px
-    alone = np.array([0, 0, size, look.edge_px, np.median(back) + contrast, 0, 0, 1.0, 0, size, 0, size, 3.0])
+    """By a disc and a soft darker disc behind it; `alone` is the fit of the disc without one."""
+    size, (bare, without) = look.radius_px, alone
 
     def fit(start: np.ndarray, free: range, every: int, turns: int) -> tuple[np.ndarray, float]:
         return _fit(u[::every], v[::every], image[::every], back[::every], start, free, turns)
 
-    bare, without = fit(alone, range(8), 1, 12)
     starts = []
-    for far in (0.5 * size, 1.3 * size):
+    for far, large, drawn in _ABOUT_BOB if look.even else (*_ABOUT_BOB, _TAKEN_FOR_ONE):
         for angle in np.arange(8) * np.pi / 4:
-            start = alone.copy()
-            right, down = far * np.cos(angle), far * np.sin(angle)
-            start[:2] = -0.2 * right, -0.2 * down  # the bob alone was drawn towards its shadow
-            start[8:11] = right, down, 0.3
+            start = _alone(image, back, look)
+            right, down = far * size * np.cos(angle), far * size * np.sin(angle)
+            start[:3] = -drawn * right, -drawn * down, large * size
+            start[8:12] = right, down, 0.3, large * size
             starts.append(fit(start, range(13), 4, 4))
-    start = alone.copy()
+    start = _alone(image, back, look)
     start[8:11] = *_rest_beside(u, v, image, back, size), 0.3
     starts += [fit(s, range(13), 4, 4) for s in (start, _exchanged(start))]
     starts.sort(key=lambda s: s[1])
@@ -185,13 +195,14 @@ def _read(values: np.ndarray, look: Look, back: np.ndarray) -> Shaded | None:
     cx, cy, radius, edge, shade, _, _, gain, right, down, strength, shadow_px, soft = (float(a) for a in values)
     shadow = Shadow(right, down, shadow_px, abs(soft), strength)
     far = float(np.hypot(right, down))
-    least = 0.25 if look.even else 0.5  # a pattern may look a little like a shadow behind most of the bob
+    least = 0.15 if look.even else 0.5  # a pattern may look a little like a shadow behind most of the bob
     both = 0.5 * (radius + far + shadow_px)  # the circle about them, if they were taken for one
     plausible = (
         0.03 < strength < 0.95
-        and 0.6 < shadow_px / radius < 1.6
+        and 0.6 < np.hypot(shadow_px, 2 * soft) / radius  # so soft a shadow as this may be of any size
+        and shadow_px < 1.6 * radius
         and 1 / 1.3 < look.radius_px / radius < max(1 / 0.6, both / radius)
-        and shadow.soft_px > max(0.3, 0.6 * abs(edge))
+        and shadow.soft_px > max(0.3 if look.even else _SHADOWY_PX, 0.6 * abs(edge))
         and radius + 1 < far + shadow_px < 6 * radius
         and far > least * radius
     )
@@ -245,9 +256,9 @@ def _beside_patterned(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.
 
 def _pixels(
     seen: list[tuple[Patch, Guess]], look: Look
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Some pixels of the patches but for the string: places relative to the guess, picture in the background's light, background,
-    and whether that was seen there."""
+    and which patch each is of."""
     bare = []
     for patch, guess in seen:
         rows, columns = np.ogrid[: patch.image.shape[0], : patch.image.shape[1]]
@@ -257,19 +268,21 @@ def _pixels(
         along, across = u * ux + v * uy, np.abs(u * uy - v * ux)
         bare.append(np.argwhere((along < 0.5 * look.radius_px) | (across > 5 + 0.1 * look.radius_px)))
     every = max(1, sum(len(places) for places in bare) // _PIXELS)
-    taken, passed = [np.empty((6, 0))], 0
+    taken, passed = [np.empty((5, 0))], 0
     for k, ((patch, guess), places) in enumerate(zip(seen, bare)):
         rows, columns = places[-passed % every :: every].T
         passed += len(places)
         u, v = columns + patch.x_px - guess.x_px, rows + patch.y_px - guess.y_px
         evened = patch.image * (rim_level(patch.back) / max(rim_level(patch.image), 1.0))
-        taken.append(
-            np.array(
-                [u, v, *(picture[rows, columns] for picture in (evened, patch.back, patch.seen)), np.full(u.size, k)]
-            )
-        )
-    u, v, image, back, times, which = np.concatenate(taken, axis=1)
-    return u, v, image, back, times > 0, which.astype(int)
+        taken.append(np.array([u, v, evened[rows, columns], patch.back[rows, columns], np.full(u.size, k)]))
+    u, v, image, back, which = np.concatenate(taken, axis=1)
+    return u, v, image, back, which.astype(int)
+
+
+def _alone(image: np.ndarray, back: np.ndarray, look: Look) -> np.ndarray:
+    """A start of the model: the bob as it was taken to be, and no shadow."""
+    shade, size = np.median(back) + (look.contrast or np.median(image) - np.median(back)), look.radius_px
+    return np.array([0, 0, size, look.edge_px, shade, 0, 0, 1.0, 0, size, 0, size, 3.0])
 
 
 def _rest_beside(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, size: float) -> tuple[float, float]:
@@ -278,27 +291,26 @@ def _rest_beside(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarr
     return float(np.average(u, weights=differs)), float(np.average(v, weights=differs))
 
 
-def _light_is_missed(
-    u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.ndarray, beside: np.ndarray, look: Look
-) -> bool:
-    """Is it darker beside the bob, on one side of it, than where the bob is not?"""
-    near = np.hypot(u, v) / look.radius_px
-    ring = beside & (near > 1.1 + look.edge_px / look.radius_px) & (near < 2.2)
-    side = (np.arctan2(v, u) * 4 / np.pi).astype(int) % 8
-    light = [
-        np.median((image / np.maximum(back, 1.0))[ring & (side == k)])
-        for k in range(8)
-        if (ring & (side == k)).sum() > 8
-    ]
-    dark = _DARK if look.even else _DARK_UNEVEN
-    return len(light) >= 4 and bool(min(light) < np.median(light) - dark or np.median(light) < 1 - 2 * dark)
+def _unexplained(u: np.ndarray, v: np.ndarray, rest: np.ndarray, radius_px: float) -> float:
+    """How much more what is left, (n,) grey levels, varies between the parts of the picture than within them; about 1 where it is
+    noise (the ratio of an analysis of variance)."""
+    part = 8 * np.digitize(np.hypot(u, v) / radius_px, _RINGS) + np.floor(np.arctan2(v, u) * 4 / np.pi).astype(int) % 8
+    most = 4 * np.std(rest)
+    tame = np.clip(rest, -most, most)
+    count, whole, square = (np.bincount(part, weight) for weight in (np.ones_like(rest), tame, tame**2))
+    some = count > 8
+    between = whole[some] ** 2 / count[some]
+    within = np.sum(square[some] - between) / np.sum(count[some] - 1)
+    return float(np.mean(between) / max(within, 1e-9))
 
 
 def _model(values: np.ndarray, u: np.ndarray, v: np.ndarray, back: np.ndarray) -> np.ndarray:
     cx, cy, radius, edge, shade, shade_x, shade_y, gain, right, down, strength, size, soft = values
     x, y = u - cx, v - cy
     bob = _covered(np.hypot(x, y), radius, edge)
-    wall = gain * back * (1 - strength * _covered(np.hypot(x - right, y - down), size, soft))
+    wall = gain * back
+    if strength:
+        wall = wall * (1 - strength * _covered(np.hypot(x - right, y - down), size, soft))
     return wall * (1 - bob) + (shade + shade_x * x + shade_y * y) * bob
 
 
@@ -309,7 +321,8 @@ def _exchanged(values: np.ndarray) -> np.ndarray:
 
 
 def _covered(distance: np.ndarray, radius: float, edge: float) -> np.ndarray:
-    from scipy.special import ndtr
-
-    covered: np.ndarray = ndtr((radius - distance) / np.hypot(edge, 0.2))
+    """How much of a disc with a Gaussian edge covers a place; the normal distribution by Page's formula (Applied Statistics 26
+    (1977) 75), right to 1.4e-4."""
+    at = (radius - distance) / np.hypot(edge, 0.2)
+    covered: np.ndarray = 0.5 + 0.5 * np.tanh(0.7988 * at * (1 + 0.04417 * at * at))
     return covered
