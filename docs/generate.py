@@ -82,8 +82,8 @@ def pages() -> dict[str, str]:
 
     return {
         "commands.md": commands_page(),
-        "effects.md": listing_page("What can act on a pendulum", "effects", catalogue.describe_effects()),
-        "models.md": listing_page("What can be fitted", "models", catalogue.describe_models()),
+        "effects.md": listing_page("What can act on a pendulum", "effects", catalogue.describe_effects(str)),
+        "models.md": listing_page("What can be fitted", "models", catalogue.describe_models(str)),
         "camera.md": listing_page("What a rendered camera can do", "", catalogue.describe_camera_effects()),
         "trackers.md": listing_page("What can localise a bob", "trackers", catalogue.describe_trackers()),
     }

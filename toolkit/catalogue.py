@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from toolkit.report.plain_math import plain_math
 
 
-def describe_effects() -> str:
-    """Every effect with its equation of motion, parameters with units and ranges, validity and reference."""
+def describe_effects(written: Callable[[str], str] = plain_math) -> str:
+    """Every effect with its equation of motion, parameters with units and ranges, validity and reference; `written` writes LaTeX."""
     from toolkit.effects import effect_names, load_effect
     from toolkit.motion import build_equation
 
@@ -19,7 +19,7 @@ def describe_effects() -> str:
         lines = [
             name,
             f"  {effect.meaning}",
-            f"  equation    {plain_math(build_equation((name,), formulas=formulas).latex)}",
+            f"  equation    {written(build_equation((name,), formulas=formulas).latex)}",
         ]
         lines += [f"  {p.name} [{p.unit}]  {p.meaning}{_range(p)}" for p in effect.parameters]
         if effect.needs:
@@ -42,8 +42,8 @@ def describe_camera_effects() -> str:
     return _text(blocks)
 
 
-def describe_models() -> str:
-    """Every model with its equation and what is fitted; those that a report fits by itself are marked."""
+def describe_models(written: Callable[[str], str] = plain_math) -> str:
+    """Every model with its equation and what is fitted; those that a report fits by itself are marked; `written` writes LaTeX."""
     from toolkit.models import STANDARD, load_model, model_names
 
     blocks = []
@@ -55,7 +55,7 @@ def describe_models() -> str:
             [
                 f"{name}{mark}",
                 f"  {model.summary}",
-                f"  equation    {plain_math(model.latex)}",
+                f"  equation    {written(model.latex)}",
                 f"  fitted      {fitted}",
             ]
         )
