@@ -75,6 +75,23 @@ def test_marks_stand_where_the_track_says(tmp_path, filmed, width, height, pivot
         assert (ring[0] > 150) == (track.status[row] == "predicted")
 
 
+def test_the_caption_does_not_lie_on_the_bob(tmp_path, filmed):
+    """Where the bob swings through the picture's last rows the caption is at the top: the bob is as bright as in the film."""
+    path, track = filmed(160, 140, [80.0, 20.0])
+    with av.open(str(path)) as film:
+        source = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    row = int(np.argmax(track.y_px))
+    assert track.y_px[row] + track.radius_px > 140 - 20
+    angle = np.linspace(0, 2 * np.pi, 60)
+    x, y = (
+        (track.x_px[row] + 5 * np.sin(angle)).round().astype(int),
+        (track.y_px[row] + 5 * np.cos(angle)).round().astype(int),
+    )
+    drawn = decode(write_overlay(path, track, tmp_path / "overlay.mp4"))[row]
+    assert np.median(drawn[y, x]) == pytest.approx(np.median(source[row][y, x]), abs=12)
+    assert drawn[2:18].mean() < 0.6 * source[row][2:18].mean()  # the caption's band
+
+
 def test_lost_frames_and_the_model(tmp_path, filmed):
     path, track = filmed(160, 140, [80.0, 20.0])
     x, y, status = track.x_px.copy(), track.y_px.copy(), track.status.copy()

@@ -22,6 +22,7 @@ _PATH_RGB, _STRING_RGB, _MODEL_RGB = (86, 180, 233), (0, 114, 178), (204, 121, 1
 _LARGEST_PX = 1280  # longer sides are scaled down: the film is to be looked at
 _TRAIL_S = 0.7
 _SUBPIXEL_BITS = 4
+_BAND = 20  # height of the caption, line thicknesses
 
 
 def write_overlay(
@@ -52,6 +53,7 @@ def write_overlay(
     scale = min(1.0, _LARGEST_PX / max(video.width_px, video.height_px))
     size = (_even(video.width_px * scale), _even(video.height_px * scale))
     rate = _rate(track.t_s)
+    above = _bob_is_low(track, scale, size)
     written = 0
     with (
         whole_file(out_path) as scratch,
@@ -70,6 +72,7 @@ def write_overlay(
                 continue
             picture = _fitted(frame.bgr, scale, size)
             _draw(picture, track, row, model, scale)
+            _caption(picture, f"{track.t_s[row]:7.3f} s  frame {track.frame[row]}  {track.status[row]}", above)
             # stamps must grow, whatever the file's own did
             last_stamp = max(float(track.t_s[row] - track.t_s[0]), last_stamp + 1e-3)
             film.write(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), last_stamp)
@@ -136,7 +139,7 @@ def _draw(picture: np.ndarray, track: Track, row: int, model: np.ndarray | None,
         where = tuple(int(v) for v in at(centre))
         cv2.circle(picture, where, round(radius * 2**_SUBPIXEL_BITS), rgb[::-1], width, cv2.LINE_AA, _SUBPIXEL_BITS)
 
-    thick = max(1, round(max(picture.shape) / 640))
+    thick = _thickness(picture.shape)
     pivot, bob = np.array(track.pivot_px), np.array([track.x_px[row], track.y_px[row]])
     status = str(track.status[row])
     radius = max(track.radius_px * scale, 3.0)
@@ -157,13 +160,27 @@ def _draw(picture: np.ndarray, track: Track, row: int, model: np.ndarray | None,
         arm = (radius + 5 * thick) / scale
         line([[x - arm, y], [x + arm, y]], _MODEL_RGB, 2 * thick)
         line([[x, y - arm], [x, y + arm]], _MODEL_RGB, 2 * thick)
-    _caption(picture, f"{track.t_s[row]:7.3f} s  frame {track.frame[row]}  {status}", thick)
 
 
-def _caption(picture: np.ndarray, text: str, thick: int) -> None:
+def _thickness(size: tuple[int, ...]) -> int:
+    """Of a line, px, in a picture of this size."""
+    return max(1, round(max(size) / 640))
+
+
+def _bob_is_low(track: Track, scale: float, size: tuple[int, int]) -> bool:
+    """Whether a caption at the bottom would lie on the bob somewhere on its way, and one at the top would not."""
+    band, radius = _BAND * _thickness(size), track.radius_px * scale
+    return bool(
+        np.nanmax(track.y_px) * scale + radius > size[1] - band and np.nanmin(track.y_px) * scale - radius > band
+    )
+
+
+def _caption(picture: np.ndarray, text: str, above: bool) -> None:
     import cv2
 
-    bottom, band = picture.shape[0], 20 * thick
-    picture[bottom - band :] = (picture[bottom - band :] * 0.35).astype(np.uint8)  # readable on any wall
+    thick = _thickness(picture.shape)
+    band = _BAND * thick
+    bottom = band if above else picture.shape[0]
+    picture[bottom - band : bottom] = (picture[bottom - band : bottom] * 0.35).astype(np.uint8)  # readable on any wall
     place = (6 * thick, bottom - 6 * thick)
     cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45 * thick, (255, 255, 255), thick, cv2.LINE_AA)
