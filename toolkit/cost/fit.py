@@ -287,6 +287,8 @@ def _draw(results: list[Result], path: Path) -> None:
         right.loglog([r.points for r in rows], [r.cpu_ms for r in rows], "o-", label=name, markersize=3)
     right.set_xlabel("points")
     right.set_ylabel("CPU time of one fit, guess included / ms")
+    right.yaxis.set_major_formatter("{x:g}")
+    right.yaxis.set_minor_formatter("{x:g}")
     right.legend(fontsize=6)
     figure.savefig(path.with_suffix(".png"), dpi=160)
     figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
