@@ -162,6 +162,25 @@ def test_the_first_page_gives_the_budgets_combined_uncertainty(analysis):
     assert told > 3 * alone  # nobody gave g
 
 
+@pytest.mark.parametrize("lang", ["en", "th"])
+def test_drags_that_cannot_be_told_apart_are_told_together(analysis, lang):
+    """Two laws that lean on each other: neither is clear of zero, but what they take together is measured."""
+    best = analysis.best
+    leaning = {n: replace(p, stderr=3 * abs(p.value)) if n in ("k_d", "c") else p for n, p in best.parameters.items()}
+    poor = replace(analysis, fits={**analysis.fits, best.model: replace(best, parameters=leaning)})
+    report = build_report(poor, lang)
+    whole = best.derived["equivalent_k_d"]
+    assert bare(with_uncertainty(whole.value, whole.stderr, "kg/s")) in answer(report, "question.drag")
+    assert bare(percent(whole.stderr / whole.value)) in answer(report, "question.sure")
+    question = report.words("question.drag")
+    remark = next(bare(fact.remark) for fact in report.facts if fact.question == question)
+    assert "k_d: " in remark
+    assert "c: " in remark
+    one = {n: replace(p, stderr=abs(p.value) / 9) if n == "c" else p for n, p in leaning.items()}
+    clear = replace(analysis, fits={**analysis.fits, best.model: replace(best, parameters=one)})
+    assert answer(build_report(clear, lang), "question.drag").startswith("k_d: ")
+
+
 def test_a_reader_of_the_first_page_is_warned(analysis, english):
     assert english.cautions == ("The table wobbled.",)
     rubs = next(f for f in analysis.findings if f.assumption not in ("small_angle", "linear_drag", "white_residuals"))

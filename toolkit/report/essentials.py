@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 _EXPLAINED = 0.9
 """Share of the angle's variance below which a reader is told that the model explains little."""
+
+_CLEAR = 2.0
+"""Standard uncertainties from zero beyond which (95 %) a number is told."""
 
 MAIN = ("small_angle", "linear_drag")
 
@@ -54,8 +58,14 @@ def facts(material: Material) -> tuple[Fact, ...]:
         remark = f"{', '.join(parts)}; {remark}"
     if "alpha_d" in best.parameters:
         remark += f"; {_without_mass(words, best)}"
-    found = [Fact(words("question.drag"), drag_answer(material, best), remark)]
-    found.append(Fact(words("question.sure"), _sure(material, best), _inflation(words, best)))
+    answer, sure = drag_answer(material, best), _sure(material, best)
+    if whole := _together(best):
+        remark = f"{answer}; {remark}"
+        shown = with_uncertainty(best.derived[whole].value, best.derived[whole].stderr, best.derived[whole].unit)
+        answer = words("answer.together", symbol=symbol(words, whole), value=shown)
+        sure = _how_sure(words, whole, best.derived[whole])
+    found = [Fact(words("question.drag"), answer, remark)]
+    found.append(Fact(words("question.sure"), sure, _inflation(words, best)))
     paper = material.paper
     if paper is not None and paper is not best and paper.success:
         wrong = any(f.verdict == "fails" for f in material.analysis.findings if f.assumption in MAIN)
@@ -137,8 +147,25 @@ def _sure(material: Material, result: FitResult) -> str:
         found = result.parameters.get(name)
         if found is not None and found.stderr and found.value > found.stderr:
             u = (_u(material, name, found) if result is material.full_sine else found.stderr) or found.stderr
-            parts.append(words("answer.sure", symbol=symbol(words, name), percent=percent(u / found.value)))
+            parts.append(_how_sure(words, name, replace(found, stderr=u)))
     return ", ".join(parts) or "–"
+
+
+def _how_sure(words: Words, name: str, found: FittedParameter) -> str:
+    assert found.stderr is not None
+    return words("answer.sure", symbol=symbol(words, name), percent=percent(found.stderr / found.value))
+
+
+def _together(result: FitResult) -> str | None:
+    """The name of the drag of all laws together where that is known, but of none of several how much is its."""
+    laws = [found for name in DRAGS if (found := result.parameters.get(name)) is not None]
+    if len(laws) < 2 or any(law.stderr is None or law.value >= law.stderr for law in laws):
+        return None
+    for name in ("equivalent_k_d", "equivalent_alpha_d"):
+        whole = result.derived.get(name)
+        if whole is not None and whole.stderr and whole.value > _CLEAR * whole.stderr:
+            return name
+    return None
 
 
 def _inflation(words: Words, result: FitResult) -> str:
