@@ -227,7 +227,7 @@ def cautions(material: Material) -> tuple[str, ...]:
     """
     words, analysis = material.words, material.analysis
     failed = [
-        f"**{assumption(words, f)}**: {sentence(words, f)}"
+        f"**{assumption(words, f)}** ({words('verdict.fails')}): {sentence(words, f)}"
         for f in analysis.findings
         if f.verdict == "fails" and f.assumption not in (*MAIN, "white_residuals")
     ]
