@@ -420,6 +420,10 @@ def main() -> None:
             raise
         if isinstance(error, MemoryError):
             _fail("out of memory; smaller pictures, fewer rows or a shorter part (--start, --stop) need less", 1)
+        if isinstance(error, OverflowError):
+            _fail(
+                "a number given is too large or too small to be calculated with; check the options and their units", 2
+            )
         kind = f"{type(error).__name__}: {error}"
         _fail(f"unexpected trouble ({kind}); set PENDULAB_DEBUG=1 to see where, and tell the developers", 1)
     if code == 130:  # Ctrl-C, by whichever way it came through the parser

@@ -222,6 +222,7 @@ def test_unsorted_and_duplicate_times_get_a_clear_word(tmp_path):
         (["--start", 100], 2, "100"),
         (["--nonsense"], 2, "--nonsense"),
         (["--overlay"], 2, "are for videos"),
+        (["--length-m", 1e300], 2, "too large"),
     ],
 )
 def test_wrong_use(tmp_path, words, code, said):
