@@ -40,7 +40,15 @@ from toolkit.render import stage
 # Which warnings (by the key of their sentence) are about which error.
 ABOUT: dict[str, frozenset[str]] = {
     "position": frozenset(
-        {"track.strays", "track.few", "track.poor_picture", "track.apart", "track.never_both", "track.rival"}
+        {
+            "track.strays",
+            "track.few",
+            "track.poor_picture",
+            "track.apart",
+            "track.never_both",
+            "track.rival",
+            "calibrate.beside",
+        }
     ),
     "zero": frozenset({"track.strays", "track.apart", "track.rival", "calibrate.wide", "track.grows"}),
     "scale": frozenset({"track.strays", "track.apart", "track.rival", "calibrate.wide"}),

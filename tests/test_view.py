@@ -221,6 +221,22 @@ def test_a_swing_of_which_one_side_is_hidden_keeps_its_vertical():
     np.testing.assert_allclose(series.theta_rad, truth.theta_rad[side], atol=2e-3)
 
 
+@pytest.mark.parametrize("bias", [(0.0, 0.0), (0.2, 1.1)])
+def test_places_beside_the_bob_that_string_and_arc_tell_of_are_warned_of(bias):
+    """As where a shadow right under the bob is taken for part of it: the angles are right all the same."""
+    view, truth, (t, x, y) = seen(0.6, bias=bias, off_px=0.5)
+    n = t.size
+    track = Track(
+        np.arange(n), t, x, y, np.full(n, SIGMA), np.full(n, SIGMA), np.full(n, "ok"), 20.0, view.pivot_px, view.pivot_sigma_px,
+        "disc", {"view": view},
+    )  # fmt: skip
+    series = calibrate(track)
+    told = [w for w in series.meta["warnings"] if w.key == "calibrate.beside"]
+    assert len(told) == (bias != (0.0, 0.0))
+    assert all(w.values["off_px"] == pytest.approx(np.hypot(*bias), abs=0.3) for w in told)
+    np.testing.assert_allclose(series.theta_rad, truth.theta_rad, atol=2e-3)
+
+
 def placed(t, x, y):
     """Places that were all measured, to 0.05 px."""
     sigma = np.full(t.size, 0.05)

@@ -148,6 +148,15 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
                 share=found.scale_u_of_view,
             )
         )
+    if view is not None and "bob" in view.shown:
+        warnings.append(
+            said(
+                "calibrate.beside",
+                "string and arc tell that the bob was found about {off_px:.1f} px beside its centre on all frames (a shadow or a "
+                "highlight taken for part of it?): the angles allow for it, the places in track.csv do not",
+                off_px=float(np.hypot(view["off_x"], view["off_y"])),
+            )
+        )
     if found.scale_u > _WIDE_U:
         warnings.append(
             said(
