@@ -437,9 +437,9 @@ def run_speed(video: Path, repeats: int = 7) -> None:
     time that passes is what a user waits for; CPU time is the sum over all processors. All are the least of `repeats` runs,
     in turn.
     """
-    from toolkit.track import Asked, _begin, _looks, _read_ahead
     from toolkit.trackers import load_tracker
     from toolkit.tracking.begin.acquire import find_clear_bob
+    from toolkit.tracking.opening import Asked, begin, openings, read_ahead
     from toolkit.video import open_video
 
     def timed(job: Callable[[], Any]) -> np.ndarray:
@@ -461,10 +461,10 @@ def run_speed(video: Path, repeats: int = 7) -> None:
     runs = [[timed(job) for job in jobs.values()] for _ in range(repeats)]
     spent = dict(zip(jobs, np.min(runs, axis=0) / frames * 1e6))
     whole = spent.pop("whole tracking")
-    look = _looks(open_video(video))[0]
-    batch = _read_ahead(iter(open_video(video)), look)
+    opening = openings(open_video(video))[0]
+    batch = read_ahead(iter(open_video(video)), opening)
     search = cpu(lambda: find_clear_bob(batch, None, None))
-    begun = _begin(open_video(video), Asked(), look)
+    begun = begin(open_video(video), Asked(), opening)
     assert begun is not None
     follower = begun[0]
     frame = batch[len(batch) // 2]
@@ -474,12 +474,12 @@ def run_speed(video: Path, repeats: int = 7) -> None:
     assert patch is not None
     locate = load_tracker("disc").locate
     fit = cpu(lambda: [locate(patch, follower.look, guess) for _ in range(2000)])
-    begin = cpu(lambda: _begin(open_video(video), Asked(), look))
+    beginning = cpu(lambda: begin(open_video(video), Asked(), opening))
     print(
         f"{video.name}: {found.meta['width_px']}x{found.meta['height_px']}, {frames} frames, ok {found.ok.mean():.1%}"
     )
     print(f"  search for the bob        {search:.3f} s CPU ({len(batch)} frames in memory; limit 0.3)")
-    print(f"  search and looks learned  {begin:.3f} s CPU (decoding of these frames included)")
+    print(f"  search and looks learned  {beginning:.3f} s CPU (decoding of these frames included)")
     print(f"  localiser                 {fit / 2000 * 1e6:.0f} us a frame (limit 50 at 720p)")
     print(f"  whole tracking            {whole[0]:.0f} us a frame passing, {whole[1]:.0f} us CPU")
     for name, alone in spent.items():

@@ -11,8 +11,9 @@ from test_track import LENGTH, PIVOT, angles, draw, film, swing_clip
 
 from toolkit.errors import UsageError
 from toolkit.sentence import said
-from toolkit.track import Asked, _begin, _looks, _soundest, track
-from toolkit.tracking.clip.soundness import SOUND, faults
+from toolkit.track import track
+from toolkit.tracking.opening import Asked, begin, openings
+from toolkit.tracking.soundness import SOUND, faults, soundest
 from toolkit.video import open_video
 
 pytest.importorskip("av")
@@ -27,12 +28,17 @@ def clip(tmp_path_factory):
     return path, swing_clip(path)
 
 
-def test_a_track_is_sound_if_it_has_nearly_all_frames_and_warns_of_no_places():
-    frames = np.arange(100)
-    assert faults(frames < 95, [HARMLESS]) < SOUND
-    assert faults(frames < 85, []) > SOUND
-    assert faults(frames < 100, [STRAYS]) >= SOUND
-    assert faults(frames < 70, []) > faults(frames < 100, [STRAYS])
+def test_a_track_is_sound_if_it_has_nearly_all_frames_and_warns_of_no_places(clip):
+    whole = track(clip[0])
+
+    def faults_of(measured, warnings):
+        status = np.where(np.arange(whole.frame.size) < measured * whole.frame.size, "ok", "lost")
+        return faults(replace(whole, status=status, meta={"warnings": warnings}))
+
+    assert faults_of(0.95, [HARMLESS]) < SOUND
+    assert faults_of(0.85, []) > SOUND
+    assert faults_of(1.0, [STRAYS]) >= SOUND
+    assert faults_of(0.7, []) > faults_of(1.0, [STRAYS])
 
 
 def test_a_shadow_that_is_tracked_well_does_not_replace_its_bob(clip):
@@ -40,31 +46,32 @@ def test_a_shadow_that_is_tracked_well_does_not_replace_its_bob(clip):
     lame = replace(bob, meta={**bob.meta, "warnings": [STRAYS]})
     soft = {**bob.meta, "contrast": 0.6 * bob.meta["contrast"], "edge_px": 3 * bob.meta["edge_px"]}
     shadow = replace(bob, x_px=bob.x_px + 16, y_px=bob.y_px + 18, meta=soft)
-    kept = _soundest([lame, shadow])
+    kept = soundest([lame, shadow])
     assert np.array_equal(kept.x_px, bob.x_px)
     assert "apart" in kept.meta["warnings"][-1]
     elsewhere = replace(shadow, x_px=bob.x_px * 0.5)  # goes its own way
-    assert np.array_equal(_soundest([lame, elsewhere]).x_px, elsewhere.x_px)
+    assert np.array_equal(soundest([lame, elsewhere]).x_px, elsewhere.x_px)
 
 
 def test_a_brief_look_is_for_films_that_show_enough_in_it():
     looks = {
-        fps: _looks(SimpleNamespace(fps_header=fps, width_px=640, height_px=480)) for fps in (None, 30.0, 59.94, 120.0)
+        fps: openings(SimpleNamespace(fps_header=fps, width_px=640, height_px=480))
+        for fps in (None, 30.0, 59.94, 120.0)
     }
     assert [look.brief for look in looks[59.94]] == [True, False, False, False, False]
     assert looks[120.0] == looks[59.94]
     assert looks[None] == looks[30.0] == looks[59.94][1:]
     spans = [look.most_s for look in looks[30.0] if look.every == 1]
     assert spans == sorted(spans)
-    large = _looks(SimpleNamespace(fps_header=60.0, width_px=3840, height_px=2160))
+    large = openings(SimpleNamespace(fps_header=60.0, width_px=3840, height_px=2160))
     assert sum(look.every == 1 and not look.brief for look in large) == 1  # memory holds no longer a look
 
 
 def test_a_clear_bob_needs_no_thorough_look(clip):
     path, (_, _, x, y) = clip
-    brief, thorough = _looks(open_video(path))[:2]
-    follower, _ = _begin(open_video(path), Asked(), brief)
-    other, _ = _begin(open_video(path), Asked(), thorough)
+    brief, thorough = openings(open_video(path))[:2]
+    follower, _ = begin(open_video(path), Asked(), brief)
+    other, _ = begin(open_video(path), Asked(), thorough)
     assert len(follower.first) < 0.6 * len(other.first)
     found = track(path)
     assert np.hypot(found.x_px - x, found.y_px - y).max() < 0.2
@@ -76,8 +83,8 @@ def test_a_bob_that_hardly_moves_yet_gets_a_thorough_look(tmp_path):
     x, y = PIVOT[0] + LENGTH * np.sin(swung), PIVOT[1] + LENGTH * np.cos(swung)
     rng = np.random.default_rng(1)
     path = film(tmp_path / "late.mp4", (draw(a, b, rng) for a, b in zip(x, y)))
-    brief = _looks(open_video(path))[0]
-    assert _begin(open_video(path), Asked(), brief) is None
+    brief = openings(open_video(path))[0]
+    assert begin(open_video(path), Asked(), brief) is None
     found = track(path)
     assert np.hypot(found.x_px - x, found.y_px - y)[found.ok].max() < 0.5
 
@@ -85,15 +92,15 @@ def test_a_bob_that_hardly_moves_yet_gets_a_thorough_look(tmp_path):
 def test_of_some_tracks_the_soundest_is_kept_and_that_they_differ_is_said(clip):
     one = track(clip[0])
     lame = replace(one, x_px=one.x_px + 7.0, meta={**one.meta, "warnings": [STRAYS]})
-    for kept in (_soundest([lame, one]), _soundest([lame, lame, one])):
+    for kept in (soundest([lame, one]), soundest([lame, lame, one])):
         assert np.array_equal(kept.x_px, one.x_px)
         (warning,) = kept.meta["warnings"]
         assert "7.0 px apart" in warning
-    assert _soundest([replace(lame, x_px=one.x_px), one]).meta["warnings"] == []
+    assert soundest([replace(lame, x_px=one.x_px), one]).meta["warnings"] == []
     gappy = replace(one, status=np.where(np.arange(one.status.size) % 4, one.status, "lost"))
-    assert _soundest([lame, gappy]).x_px[0] == lame.x_px[0]  # neither is sound
+    assert soundest([lame, gappy]).x_px[0] == lame.x_px[0]  # neither is sound
     blind = replace(one, status=np.full_like(one.status, "lost"))
-    assert "no common frame" in _soundest([blind, one]).meta["warnings"][0]
+    assert "no common frame" in soundest([blind, one]).meta["warnings"][0]
 
 
 def test_a_bob_said_to_be_outside_the_picture_is_misuse(clip):

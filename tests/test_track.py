@@ -9,10 +9,11 @@ import pytest
 
 from toolkit.calibrate import arc_pivot, calibrate, line_pivot, write_calibration_json
 from toolkit.errors import JobError, UsageError
-from toolkit.track import OK, PREDICTED, Asked, Look, _begin, track, write_track_csv
+from toolkit.track import OK, PREDICTED, track, write_track_csv
 from toolkit.tracking.clip.hands import held_still
 from toolkit.tracking.clip.places import Places
 from toolkit.tracking.geometry.swing import NAMES, fit_circle, fit_swing
+from toolkit.tracking.opening import Asked, Opening, begin
 from toolkit.video import open_video
 
 av = pytest.importorskip("av")
@@ -177,7 +178,7 @@ def test_a_swing_that_dies_away_is_not_held():
 
 
 def test_how_bright_the_bob_is_is_known_before_the_first_frame_is_followed(plain):
-    follower, _ = _begin(open_video(plain[0]), Asked(), Look(1, 1.6))
+    follower, _ = begin(open_video(plain[0]), Asked(), Opening(1, 1.6))
     shade, scatter = follower.ordinary_shade
     assert shade == pytest.approx(16 + 60 * 219 / 255, abs=1.5)  # as drawn, in the luma of a video
     assert scatter < 2

@@ -15,6 +15,7 @@ from toolkit.trackers.localiser import Look
 from toolkit.tracking.begin.rival import find_rival
 from toolkit.tracking.begin.search import Hypothesis, find_round_movers
 from toolkit.tracking.begin.trail import Rough, Stage, Trail, begin_trail, cut
+from toolkit.tracking.geometry.beside import go_side_by_side
 from toolkit.tracking.picture.plane import even_light, shrink, silhouette, still_picture
 from toolkit.tracking.picture.repeat import repeats
 from toolkit.tracking.picture.sight import LUMA, Sight, best_sight, small_planes
@@ -123,12 +124,9 @@ def _is_shadow_of(one: Rough, other: Rough) -> bool:
     common = sorted(one.points.keys() & other.points.keys())
     if len(common) < _MOSTLY * len(one.points) or not other.clearness > _SHADOWED * one.clearness:
         return False
-    off = np.array([np.subtract(one.points[i], other.points[i]) for i in common])
-    usual = np.median(off, axis=0)
-    beside = np.hypot(*usual) > max(one.look.radius_px, other.look.radius_px)
     fainter = abs(one.look.contrast) < 0.8 * abs(other.look.contrast) and one.look.edge_px > other.look.edge_px
-    together = np.hypot(*(off - usual).T) < 0.4 * other.look.radius_px
-    return bool(beside and fainter and np.mean(together) > _MOSTLY)
+    path, its_path = (np.array([rough.points[i] for i in common]).T for rough in (one, other))
+    return fainter and go_side_by_side(path, its_path, max(one.look.radius_px, other.look.radius_px))
 
 
 def _weight(batch: list[Frame], rough: Rough, still: np.ndarray) -> float:

@@ -199,7 +199,7 @@ def _read(values: np.ndarray, look: Look, back: np.ndarray) -> Shaded | None:
     both = 0.5 * (radius + far + shadow_px)  # the circle about them, if they were taken for one
     plausible = (
         0.03 < strength < 0.95
-        and 0.6 < np.hypot(shadow_px, 2 * soft) / radius  # so soft a shadow as this may be of any size
+        and np.hypot(shadow_px, 2 * soft) > 0.6 * radius  # so soft a shadow as this may be of any size
         and shadow_px < 1.6 * radius
         and 1 / 1.3 < look.radius_px / radius < max(1 / 0.6, both / radius)
         and shadow.soft_px > max(0.3 if look.even else _SHADOWY_PX, 0.6 * abs(edge))
