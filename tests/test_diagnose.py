@@ -232,3 +232,15 @@ def test_a_check_fires_where_its_assumption_breaks_and_is_silent_where_it_holds(
     assert finding.words_key.startswith(name)
     silent = small_verdicts() if name in ("small_angle", "linear_drag") else clean_verdicts()
     assert name not in silent or silent[name].verdict == "holds"
+
+
+def test_a_record_may_begin_before_zero():
+    """As where a rolling shutter reads the bob's row before the middle of the first frame."""
+    t = np.arange(600) / 60
+    theta = 0.3 * np.exp(-0.02 * t) * np.cos(4.4 * t) + np.random.default_rng(1).normal(0, 1e-3, t.size)
+    verdicts = []
+    for begin_s in (0.0, -0.003):
+        series = ThetaSeries(t + begin_s, theta, np.full(t.size, 1e-3))
+        found = diagnose(series, fit_models(series, Scene()), Scene())
+        verdicts.append([(finding.assumption, finding.verdict) for finding in found])
+    assert verdicts[0] == verdicts[1]

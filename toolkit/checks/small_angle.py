@@ -181,6 +181,7 @@ def _threshold(evidence: Evidence, full: FitResult, largest: float) -> tuple[flo
     n = len(evidence.series)
     keep = np.unique(np.linspace(0, n - 1, min(n, _POINTS)).astype(int))
     t = evidence.series.t_s[keep]
+    t = t - t[0]  # rows that are read before the frame's middle begin before 0
     sigma = evidence.sigma_rad[keep] * math.sqrt(evidence.inflation2 * keep.size / n)
     omega = omega_g_of(full)
     rate = full.derived["Q"].value if "Q" in full.derived else math.inf
