@@ -28,6 +28,8 @@ _CHECK_EVERY = 12
 _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
 _WAVERS = 0.02  # of the radius: what strays more from a swing may have a pattern up to its outline
+CIRCLES = "disc", "edge", "template"  # the localisers that take the bob to be round
+_LEAPS_PX = 0.3  # so far a camera that a hand holds makes any bob stray
 _CALM = 1.5  # times as far as another's: places of some forty frames that stray more do so by no chance
 _CLEARLY = 1.15  # times as far on the same frames, some fifty: by chance alone it is less
 _ROUND = 0.75  # of the outline: of a bold pattern's less is to be seen now and then
@@ -361,9 +363,12 @@ class Known:
             given = self._try(edge, looks, batch, points)
             calmer = own is not None and (given is None or own.calmer_than(given))
             tried.append(own if calmer else given)
-            if looks.look.even or not any(tried):  # parts of a pattern pull the middle of what is like the bob
+            least_px = min((trial.swing.rms_px for trial in tried if trial is not None), default=np.inf)
+            if looks.look.even or not any(tried):
                 others = (name for name in tracker_names() if name not in ("disc", "edge"))
                 tried += [self._try(load_tracker(name), looks, batch, points) for name in others]
+            elif least_px > max(_WAVERS * looks.look.radius_px, _LEAPS_PX):
+                tried += self._try_middles(looks, batch, points)
         self.look, self.exposure_s, self.growth = looks
         found = [trial for trial in tried if trial is not None]
         if not found:
@@ -419,16 +424,23 @@ class Known:
         outlined = Looks(look._replace(radius_free=looks.look.radius_free), learned.looks.exposure_s, growth)
         return self._try(edge, outlined, batch, points, _HARDLY)
 
+    def _try_middles(self, looks: Looks, batch: list[Frame], points: dict[int, tuple[float, float]]) -> list[Trial]:
+        """The localisers that take the middle of what is like the bob, where this is steady: parts of a pattern pull it, but circles
+        that leap about lie on no round bob."""
+        names = (name for name in tracker_names() if name not in CIRCLES)
+        trials = (self._try(load_tracker(name), looks, batch, points, None) for name in names)
+        return [t for t in trials if t is not None and t.swing.rms_px < STEADY * looks.look.radius_px]
+
     def _try(
         self,
         localiser: Localiser,
         looks: Looks,
         batch: list[Frame],
         points: dict[int, tuple[float, float]],
-        shows: float = _SHOWS,
+        shows: float | None = _SHOWS,
     ) -> Trial | None:
         """What this localiser makes of the frames on which the bob was found, if it looks so; None where it sees it, or this share of
-        its outline, on too few."""
+        its outline, on too few. Without a share what counts is how much it usually sees: it takes the bob for no circle."""
         self.look, self.exposure_s, self.growth = looks
         velocity = self.swing.velocity(np.array([batch[i].t_s for i in points]))
         places = {}
@@ -437,8 +449,11 @@ class Known:
             patch = self._patch(batch[i], self.look, guess)
             place = NOWHERE if patch is None else localiser.locate(patch, self.look_at(guess), guess)
             place, _ = self._beside_shadow(localiser, batch[i], guess, place) or (place, patch)
-            if np.isfinite(place.x_px) and place.visible > shows:
+            if np.isfinite(place.x_px):
                 places[i] = place
+        usual = 1.0 if shows is not None or not places else float(np.median([p.visible for p in places.values()]))
+        least = usual * (_SHOWS if shows is None else shows)
+        places = {i: p for i, p in places.items() if p.visible > least}
         if len(places) < 10 or len(places) <= 0.5 * len(points):
             return None
         t = np.array([batch[i].t_s for i in places])
@@ -453,7 +468,7 @@ class Known:
         if clear.sum() < 10:
             clear[:] = True
         speeds = np.hypot(*swing.velocity(t))
-        ordinary = float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear])
+        ordinary = float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear], usual)
         shades = np.array([(p.contrast + p.wall) / p.light for p in places.values()])
         shade = float(np.median(shades))
         scatter = 1.4826 * float(np.median(np.abs(shades - shade)))
@@ -531,11 +546,15 @@ class Known:
         return patch if self.shadow is None else self.shadow.cast(patch, guess)
 
 
-def _by_speed(speed: np.ndarray, visible: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
+def _by_speed(
+    speed: np.ndarray, visible: np.ndarray, usual: float = 1.0
+) -> tuple[tuple[float, float], tuple[float, float]]:
     """How much of the outline is to be seen at least, at two speeds (px/s): a rolling shutter shears it where the bob is fast,
     and what is seen on nine frames of ten is not hidden."""
     fast = speed > np.median(speed)
-    least = [float(np.clip(np.percentile(visible[part], 10) - 0.05, 0.65, 0.85)) for part in (~fast, fast)]
+    least = [
+        float(np.clip(np.percentile(visible[part], 10) - 0.05, 0.65 * usual, 0.85 * usual)) for part in (~fast, fast)
+    ]
     return (float(np.median(speed[~fast])), float(np.median(speed[fast]))), (least[0], least[1])
 
 
