@@ -82,8 +82,10 @@ class View:
         return Swing(values, self.covariance[:9, :9] * np.outer(f, f), self.t0_s * fps_factor, 0.0)
 
     def row_time(self, t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
-        """When the bob's own row was exposed."""
-        return np.asarray(t_s + self["readout"] * self.rows(x_px, y_px))
+        """When the bob's own row was exposed. Where the clip does not show a readout clearly it is the mean of what clip and prior
+        allow (Bayes' estimate), not none: rows that are read at other times bend θ(t) as laws of drag do."""
+        readout = self["readout"] if "readout" in self.shown else float(self.weights @ self.samples[:, AT["readout"]])
+        return np.asarray(t_s + readout * self.rows(x_px, y_px))
 
     def position(self, t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the motion has the bob in the picture at stamps t_s; x_px, y_px tell its row."""
