@@ -8,8 +8,8 @@ from scipy.ndimage import gaussian_filter
 
 from toolkit import Scene, render, track
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.begin.bold import learn_bold
-from toolkit.tracking.geometry.swing import fit_swing, start_swing
+from toolkit.tracking.begin.bold import learn_bold, on_swing
+from toolkit.tracking.geometry.swing import Swing, fit_swing, start_swing
 from toolkit.tracking.picture.looks import Sightings
 
 WALL, DARK, RADIUS = 180.0, 70.0, 16.0
@@ -112,3 +112,18 @@ def test_a_bob_that_turns_a_face_nearly_as_bright_as_the_wall_is_believed(tmp_pa
     found, off_px = tracked(tmp_path, {"bob_radius_m": 0.035}, 0.6, camera, localiser=localiser)
     assert found.ok.mean() > least  # else it is half of them
     assert np.all(off_px < 0.5)
+
+
+def test_a_motion_that_runs_beyond_all_numbers_draws_no_place():
+    """As it was fitted to a bob that a hand held for two seconds: undamped fifteenfold a second, and more the faster it is."""
+    swing = Swing(
+        np.array([737.3, 408.8, 117.8, 0.338, 2.35, -2.09, -15.45, 0.027, 0.0165]), np.zeros((9, 9)), 0.0333, 0.88
+    )
+    t_s = np.arange(72) / 30
+    places = {k: (780.0, 515.0 + k) for k in range(72)}
+    with np.errstate(all="ignore"):
+        assert not np.isfinite(swing.position(t_s)).all()
+        assert on_swing(places, t_s, swing) == places
+        drawn = on_swing(dict(list(places.items())[:3]), t_s[:3], swing)
+    assert list(drawn) == [0, 1, 2]
+    assert np.isfinite(list(drawn.values())).all()

@@ -66,7 +66,8 @@ def learn_bold(
         size = radius or _agreed([fits[k] for k in sorted(fits, key=lambda k: way_px[k])[: len(fits) // 2]])
         if through is None or not 1 / _RANGE < size / first_px < _RANGE:
             return None
-        before, calm = look, through.rms_px < STEADY * size
+        # a motion fitted to a bob that a hand holds may run beyond all numbers
+        before, calm = look, through.rms_px < STEADY * size and bool(np.isfinite(through.position(t_s)).all())
         centres |= dict(zip(centres, positions(through, t_s[list(centres)]))) if calm else places
         look = look._replace(radius_px=size, noise=float(np.median([fit.place.misfit for fit in fits.values()])))
         look = look._replace(edge_px=_likeliest_edge(seen, look, centres, way_px))
@@ -75,6 +76,12 @@ def learn_bold(
         if abs(size - before.radius_px) < _SETTLED and abs(look.edge_px - before.edge_px) < 2 * _SETTLED:
             break
     return best if len(fits) >= _MOST * len(centres) else None
+
+
+def on_swing(places: dict[int, tuple[float, float]], t_s: np.ndarray, swing: Swing) -> dict[int, tuple[float, float]]:
+    """The places, seen at times t_s (n,), as the swing draws them; as they are where it runs beyond all numbers."""
+    drawn = positions(swing, t_s)
+    return dict(zip(places, drawn)) if np.isfinite(drawn).all() else places
 
 
 def positions(swing: Swing, t_s: np.ndarray) -> list[tuple[float, float]]:

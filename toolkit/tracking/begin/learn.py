@@ -12,7 +12,7 @@ from toolkit.trackers import load_tracker, tracker_names
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.tracking.begin.acquire import is_even, scattered
-from toolkit.tracking.begin.bold import STEADY, learn_bold, positions
+from toolkit.tracking.begin.bold import STEADY, learn_bold, on_swing
 from toolkit.tracking.begin.trail import Rough, cut
 from toolkit.tracking.geometry.swing import CALM, Swing, fit_swing
 from toolkit.tracking.picture.background import Background
@@ -396,7 +396,7 @@ class Known:
                 self.ordinary_visible = (0.0, 1.0), (_HARDLY, _HARDLY)
             if self.bold and best.swing.rms_px < STEADY * self.look.radius_px:
                 t_s = np.array([batch[i].t_s for i in points])
-                points = dict(zip(points, positions(self.swing, t_s)))
+                points = on_swing(points, t_s, self.swing)
                 self.found |= {batch[i].index: p for i, p in points.items()}
             self._learn_background(batch, self.look, points)
         return best.localiser
@@ -418,7 +418,7 @@ class Known:
         if learned is None:
             return None
         if learned.calm:
-            points = dict(zip(points, positions(learned.swing, t_s)))
+            points = on_swing(points, t_s, learned.swing)
         look, slope = learned.looks.look, None if looks.growth is None else looks.growth[0]
         growth = None if slope is None else (slope, look.radius_px - slope * float(np.median(seen.x_px)))
         outlined = Looks(look._replace(radius_free=looks.look.radius_free), learned.looks.exposure_s, growth)
