@@ -62,10 +62,11 @@ def test_a_picture_that_lies_on_its_side_is_tracked_upright(swing, tmp_path, deg
     assert np.sqrt(np.mean(errors**2)) < 0.05
 
 
-def test_a_hand_in_the_picture_holds_the_bob_and_lets_go(tmp_path):
-    """For most of what the search looks at, its fingers over the bob; then it goes away to the right."""
+@pytest.mark.parametrize("released", [1.2, 2.8])
+def test_a_hand_in_the_picture_holds_the_bob_and_lets_go(tmp_path, released):
+    """For most of what the search looks at, or all of it, its fingers over the bob; then it goes away to the right."""
     rng = np.random.default_rng(5)
-    t, released = np.arange(220) / FPS, 1.2
+    t = np.arange(int((released + 6.1) * FPS)) / FPS
     held = t < released
     theta = np.interp(t - released, t, angles(t)) + held * np.convolve(
         rng.normal(0, 0.003, t.size), np.ones(9) / 3, "same"

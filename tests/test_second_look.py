@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -13,7 +14,7 @@ from toolkit.errors import UsageError
 from toolkit.sentence import said
 from toolkit.track import track
 from toolkit.tracking.opening import Asked, begin, openings
-from toolkit.tracking.soundness import SOUND, faults, soundest
+from toolkit.tracking.soundness import HOPELESS, SOUND, faults, soundest
 from toolkit.video import open_video
 
 pytest.importorskip("av")
@@ -33,7 +34,7 @@ def test_a_track_is_sound_if_it_has_nearly_all_frames_and_warns_of_no_places(cli
 
     def faults_of(measured, warnings):
         status = np.where(np.arange(whole.frame.size) < measured * whole.frame.size, "ok", "lost")
-        return faults(replace(whole, status=status, meta={"warnings": warnings}))
+        return faults(replace(whole, status=status, meta={**whole.meta, "warnings": warnings}))
 
     assert faults_of(0.95, [HARMLESS]) < SOUND
     assert faults_of(0.85, []) > SOUND
@@ -99,10 +100,38 @@ def test_of_some_tracks_the_soundest_is_kept_and_that_they_differ_is_said(clip):
     assert soundest([replace(lame, x_px=one.x_px), one]).meta["warnings"] == []
     gappy = replace(one, status=np.where(np.arange(one.status.size) % 4, one.status, "lost"))
     assert soundest([lame, gappy]).x_px[0] == lame.x_px[0]  # neither is sound
-    blind = replace(one, status=np.full_like(one.status, "lost"))
-    assert "no common frame" in soundest([blind, one]).meta["warnings"][0]
+    first = np.arange(one.status.size) < one.status.size // 2
+    halves = [replace(one, status=np.where(part, one.status, "lost")) for part in (first, ~first)]
+    assert "no common frame" in soundest(halves).meta["warnings"][0]
 
 
 def test_a_bob_said_to_be_outside_the_picture_is_misuse(clip):
     with pytest.raises(UsageError, match="outside the picture"):
         track(clip[0], bob=(-3.0, 20.0))
+
+
+def test_what_strays_as_far_as_the_bob_is_large_is_not_the_bob_and_the_clip_is_searched_over_a_longer_time(
+    clip, monkeypatch
+):
+    bob = track(clip[0])
+    astray = replace(
+        bob, x_px=bob.x_px * 0.5, meta={**bob.meta, "residual_rms_px": bob.radius_px, "warnings": [STRAYS]}
+    )
+    assert faults(bob) < SOUND < HOPELESS < faults(astray)
+    assert soundest([astray, bob]).meta["warnings"] == []  # that what is no bob is elsewhere says nothing
+
+    module, searched = importlib.import_module("toolkit.track"), []
+    follow, end = module.follow_bob, module.finish
+
+    def noted(video, asked, opening, progress):
+        searched.append(opening.every)
+        return follow(video, asked, opening, progress)
+
+    def finished(*what):
+        end(*what)
+        return bob if searched[-1] > 1 else astray
+
+    monkeypatch.setattr(module, "follow_bob", noted)
+    monkeypatch.setattr(module, "finish", finished)
+    assert np.array_equal(track(clip[0]).x_px, bob.x_px)
+    assert searched[-1] == 3

@@ -12,7 +12,7 @@ from toolkit.trackers import load_tracker
 from toolkit.tracking.finish import finish
 from toolkit.tracking.opening import Asked, follow_bob, openings
 from toolkit.tracking.result import LOST, OK, PREDICTED, Track, write_track_csv
-from toolkit.tracking.soundness import SOUND, faults, soundest
+from toolkit.tracking.soundness import HOPELESS, SOUND, faults, soundest
 from toolkit.video import open_video
 
 __all__ = ["LOST", "OK", "PREDICTED", "Track", "track", "write_track_csv"]
@@ -56,7 +56,7 @@ def track(
     refusal: JobError | None = None
     found: list[Track] = []
     for opening in openings(video):
-        if found and opening.every > 1:
+        if opening.every > 1 and any(faults(track) < HOPELESS for track in found):
             break
         try:
             follower = follow_bob(video, asked, opening, progress)

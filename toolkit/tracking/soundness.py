@@ -13,21 +13,24 @@ from toolkit.tracking.result import Track
 _POOR = frozenset({"track.strays", "track.few"})  # warnings that the places may be wrong
 _TENTH = 0.1  # of the frames: a warning weighs as much
 SOUND = _TENTH  # with fewer faults there is no reason to look at a clip again
+HOPELESS = 1.0  # with more it is no track of the bob
+_ASTRAY = 0.5  # of its radius: places that stray farther from a swing are none of the bob's
 _APART_PX = 1.0
 _CLEARLY = 0.2  # of the frames: a track with so many more of them is better though it is not sound
 
 
 def faults(track: Track) -> float:
-    """The share of frames on which the bob was not measured, and a tenth for each warning that its places may be wrong. A bob that does
-    not look as it should is none: it would not on a longer look."""
+    """The share of frames on which the bob was not measured, and a tenth for each warning that its places may be wrong; one more where
+    they stray so far that they are not the bob's. A bob that does not look as it should is none: it would not on a longer look."""
     told = {getattr(warning, "key", "") for warning in track.meta["warnings"]}
-    return 1.0 - float(np.mean(track.ok)) + _TENTH * len(told & _POOR)
+    astray = track.meta["residual_rms_px"] > _ASTRAY * track.radius_px
+    return 1.0 - float(np.mean(track.ok)) + _TENTH * len(told & _POOR) + HOPELESS * astray
 
 
 def soundest(tracks: list[Track]) -> Track:
     """The best of some tracks of a clip, but no shadow's; it warns where another has the bob elsewhere."""
-    bobs = [track for track in tracks if not any(_is_shadow_of(track, other) for other in tracks)]
-    best, *later = bobs or tracks
+    tracks = [track for track in tracks if faults(track) < HOPELESS] or tracks
+    best, *later = [track for track in tracks if not any(_is_shadow_of(track, other) for other in tracks)] or tracks
     for track in later:  # a longer look is no better in itself
         if faults(track) < max(SOUND, faults(best) - _CLEARLY):
             best = track

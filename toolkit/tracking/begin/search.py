@@ -103,6 +103,8 @@ def _centred(
     """The centre of the circle of about this radius through the edge pixels near it that face away from it (nx, ny): what part
     of the outline is missing moves it little."""
     start, a = (x, y), np.zeros(3)
+    near = np.hypot(columns - x, rows - y) < 2 * radius  # what is farther away can be on no such circle
+    columns, rows, nx, ny, weight = columns[near], rows[near], nx[near], ny[near], weight[near]
     for _ in range(6):
         dx, dy = columns - start[0] - a[0], rows - start[1] - a[1]
         d = np.hypot(dx, dy) + 1e-9
