@@ -80,7 +80,7 @@ def find_round_near(
     if rows.size < 8:
         return None
     length = size[rows, columns]
-    weight = np.sqrt(length / strong).clip(0, 1)
+    weight = np.sqrt(length / max(strong, 1e-9)).clip(0, 1)
     nx, ny = gx[rows, columns] / length, gy[rows, columns] / length
     bin_size = max(1.0, radius_px / 7)
     edges = np.array([columns, rows, nx, ny, weight], float)
