@@ -32,14 +32,15 @@ def clip(tmp_path_factory):
 def test_a_track_is_sound_if_it_has_nearly_all_frames_and_warns_of_no_places(clip):
     whole = track(clip[0])
 
-    def faults_of(measured, warnings):
+    def faults_of(measured, warnings, log=()):
         status = np.where(np.arange(whole.frame.size) < measured * whole.frame.size, "ok", "lost")
-        return faults(replace(whole, status=status, meta={**whole.meta, "warnings": warnings}))
+        return faults(replace(whole, status=status, meta={**whole.meta, "warnings": warnings, "log": log}))
 
     assert faults_of(0.95, [HARMLESS]) < SOUND
     assert faults_of(0.85, []) > SOUND
     assert faults_of(1.0, [STRAYS]) >= SOUND
     assert faults_of(0.7, []) > faults_of(1.0, [STRAYS])
+    assert faults_of(0.7, [], [said("track.held_still", "a hand catches it")]) < SOUND
 
 
 def test_a_shadow_that_is_tracked_well_does_not_replace_its_bob(clip):

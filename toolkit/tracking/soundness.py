@@ -11,6 +11,7 @@ from toolkit.tracking.geometry.beside import go_side_by_side
 from toolkit.tracking.result import Track
 
 _POOR = frozenset({"track.strays", "track.few"})  # warnings that the places may be wrong
+_HELD = frozenset({"track.released", "track.held_still"})
 _TENTH = 0.1  # of the frames: a warning weighs as much
 SOUND = _TENTH  # with fewer faults there is no reason to look at a clip again
 HOPELESS = 1.0  # with more it is no track of the bob
@@ -22,9 +23,10 @@ _CLEARLY = 0.2  # of the frames: a track with so many more of them is better tho
 def faults(track: Track) -> float:
     """The share of frames on which the bob was not measured, and a tenth for each warning that its places may be wrong; one more where
     they stray so far that they are not the bob's. A bob that does not look as it should is none: it would not on a longer look."""
-    told = {getattr(warning, "key", "") for warning in track.meta["warnings"]}
+    told, logged = ({getattr(line, "key", "") for line in track.meta[name]} for name in ("warnings", "log"))
+    ok = np.trim_zeros(track.ok) if logged & _HELD else track.ok  # a hand held it at first or at last
     astray = track.meta["residual_rms_px"] > _ASTRAY * track.radius_px
-    return 1.0 - float(np.mean(track.ok)) + _TENTH * len(told & _POOR) + HOPELESS * astray
+    return 1.0 - float(np.mean(ok)) + _TENTH * len(told & _POOR) + HOPELESS * astray
 
 
 def soundest(tracks: list[Track]) -> Track:
