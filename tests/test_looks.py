@@ -12,7 +12,7 @@ from test_track import H, W, angles, film
 
 from toolkit.track import OK, track
 from toolkit.trackers.localiser import Guess, Look, Patch
-from toolkit.tracking.begin.learn import _by_speed
+from toolkit.tracking.begin.trial import _by_speed
 from toolkit.tracking.picture.looks import Looks, Sightings, _exposure, _nears, _total, learn_looks
 from toolkit.tracking.picture.stillness import Anchors
 

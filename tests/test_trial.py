@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from test_track import angles
 
-from toolkit.tracking.begin.learn import Trial
+from toolkit.tracking.begin.trial import Trial
 from toolkit.tracking.geometry.swing import fit_swing, start_swing
 from toolkit.tracking.picture.looks import Looks
 

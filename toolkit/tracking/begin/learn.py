@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from math import atan2, hypot
-from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.sentence import said
 from toolkit.trackers import load_tracker, tracker_names
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Localiser, Look, Patch, Place
 from toolkit.tracking.begin.acquire import is_even, scattered
 from toolkit.tracking.begin.bold import STEADY, learn_bold, on_swing
 from toolkit.tracking.begin.trail import Rough, cut
-from toolkit.tracking.geometry.swing import CALM, Swing, fit_swing
+from toolkit.tracking.begin.trial import SHOWS, Trial, judge, take_best, told_choice
+from toolkit.tracking.geometry.swing import CALM, fit_swing
 from toolkit.tracking.picture.background import Background
 from toolkit.tracking.picture.front import EVEN, Rhythm, find_front, fit_each, is_clear, typical
 from toolkit.tracking.picture.looks import Looks, Sightings, grown, learn_looks
@@ -30,55 +29,10 @@ _ENOUGH = 12  # frames
 _WAVERS = 0.02  # of the radius: what strays more from a swing may have a pattern up to its outline
 CIRCLES = "disc", "edge", "template"  # the localisers that take the bob to be round
 _LEAPS_PX = 0.3  # so far a camera that a hand holds makes any bob stray
-_CALM = 1.5  # times as far as another's: places of some forty frames that stray more do so by no chance
-_CLEARLY = 1.15  # times as far on the same frames, some fifty: by chance alone it is less
 _ROUND = 0.75  # of the outline: of a bold pattern's less is to be seen now and then
-# of the outline, at least, where the bob is said to be found; and of one with a bold pattern
-_SHOWS, _HARDLY = 0.6, 0.1
+_HARDLY = 0.1  # of the outline of one with a bold pattern is seen at least
 _CASTS = 2.5, 1.0, 1.0  # the bob's edge is so much softer as it is found with a shadow cast anew each time
 _LESS = 0.8  # of the misfit: by so much a bob with a pattern is explained better with a shadow
-
-
-class Trial(NamedTuple):
-    """A localiser on the frames read ahead, with the looks it took the bob to have: on how many it finds the bob, the motion fitted
-    to its places, and what misfit, how much of the outline (at two speeds) and which brightness of the bob (and scatter of it)
-    are ordinary for it."""
-
-    localiser: Localiser
-    looks: Looks
-    found: int
-    swing: Swing
-    misfit: float
-    visible: tuple[tuple[float, float], tuple[float, float]]
-    shade: tuple[float, float]
-    strays_px: dict[int, float]  # from the swing, on each frame
-    places: dict[int, tuple[float, float, float]]  # time, x and y on each frame
-
-    def calmer_than(self, other: Trial, times: float = 1.0) -> bool:
-        """Does the other stray more (than so many times as far), on the frames on which both find the bob?"""
-        both = self.strays_px.keys() & other.strays_px.keys()
-        mine, its = (sum(trial.strays_px[i] ** 2 for i in both) for trial in (self, other))
-        return times**2 * mine < its
-
-    def finds_more_than(self, other: Trial) -> bool:
-        """Does it find the bob on more frames, and no less calmly on those on which both find it?"""
-        if self.found <= 1.05 * other.found:
-            return False
-        mine_px, its_px = self.rms_with(other)
-        return mine_px <= 1.05 * its_px
-
-    def rms_with(self, other: Trial) -> tuple[float, float]:
-        """How far (rms, px) this and the other stray from a swing through the frames on which both find the bob: where a camera looks
-        aslant, or where little is seen of the bob, whoever finds it on fewer frames strays less from a swing of its own."""
-        both = sorted(self.places.keys() & other.places.keys())
-        if len(both) == len(self.places) == len(other.places) or len(both) < 10:
-            return self.swing.rms_px, other.swing.rms_px
-        strays = []
-        for trial in (self, other):
-            t, x, y = np.array([trial.places[i] for i in both]).T
-            swing = fit_swing(t, x, y, np.full(t.size, 0.1), trial.swing.values_at(t[0]))
-            strays.append((swing or trial.swing).rms_px)
-        return strays[0], strays[1]
 
 
 class Known:
@@ -374,19 +328,8 @@ class Known:
         if not found:
             return load_tracker(wanted or "disc")
         if doubted:
-            self.choice = _told_choice(found, abs(self.look.contrast))
-        # whatever it explains, what leaps about was not found; what errs alike on all frames does not leap
-        calmest, least = min(found, key=lambda t: t.swing.rms_px), max(0.05, 0.01 * self.look.radius_px)
-        calm = [mine < _CALM * its + least for mine, its in (t.rms_with(calmest) for t in found)]
-        # a model with more freedom leaves less of any picture; what an outline that is no circle leaves hardly moves a bob of one shade
-        less = 0.0 if self.look.even else 0.7
-        # a pattern that pulls its place makes the bob waver, however well the picture is explained
-        waver = [not self.look.even and any(other.calmer_than(t, _CLEARLY) for other in found) for t in found]
-        steady = [t for t, leaps_not, wavers in zip(found, calm, waver) if leaps_not and not wavers] or found
-        best = min(
-            (t for t in steady if not any(other.finds_more_than(t) for other in steady)),
-            key=lambda t: t.misfit * (less if t.localiser.name == "disc" else 1.0),
-        )
+            self.choice = told_choice(found, abs(self.look.contrast))
+        best = take_best(found, self.look)
         self.look, self.exposure_s, self.growth = best.looks
         self.swing, self.ordinary_misfit, self.ordinary_visible = best.swing, best.misfit, best.visible
         self.ordinary_shade = best.shade
@@ -437,7 +380,7 @@ class Known:
         looks: Looks,
         batch: list[Frame],
         points: dict[int, tuple[float, float]],
-        shows: float | None = _SHOWS,
+        shows: float | None = SHOWS,
     ) -> Trial | None:
         """What this localiser makes of the frames on which the bob was found, if it looks so; None where it sees it, or this share of
         its outline, on too few. Without a share what counts is how much it usually sees: it takes the bob for no circle."""
@@ -451,31 +394,8 @@ class Known:
             place, _ = self._beside_shadow(localiser, batch[i], guess, place) or (place, patch)
             if np.isfinite(place.x_px):
                 places[i] = place
-        usual = 1.0 if shows is not None or not places else float(np.median([p.visible for p in places.values()]))
-        least = usual * (_SHOWS if shows is None else shows)
-        places = {i: p for i, p in places.items() if p.visible > least}
-        if len(places) < 10 or len(places) <= 0.5 * len(points):
-            return None
-        t = np.array([batch[i].t_s for i in places])
-        x, y, misfit, visible = np.array([(p.x_px, p.y_px, p.misfit, p.visible) for p in places.values()]).T
-        swing = fit_swing(t, x, y, np.full(t.size, 0.1), self.swing.values_at(t[0]))
-        if swing is None:
-            return None
-        # not beside a frame on which it was not found: something hid a part of it there
-        clear = np.array(
-            [all(k in places for k in (i - 2, i - 1, i + 1, i + 2) if 0 <= k < len(batch)) for i in places]
-        )
-        if clear.sum() < 10:
-            clear[:] = True
-        speeds = np.hypot(*swing.velocity(t))
-        ordinary = float(np.percentile(misfit, 90)), _by_speed(speeds[clear], visible[clear], usual)
-        shades = np.array([(p.contrast + p.wall) / p.light for p in places.values()])
-        shade = float(np.median(shades))
-        scatter = 1.4826 * float(np.median(np.abs(shades - shade)))
-        strays = np.hypot(*(drawn - at for drawn, at in zip(swing.position(t), (x, y))))
-        seen = dict(zip(places, zip(t.tolist(), x.tolist(), y.tolist())))
-        far = dict(zip(places, strays.tolist()))
-        return Trial(localiser, looks, len(places), swing, *ordinary, (shade, scatter), far, seen)
+        t_s = np.array([frame.t_s for frame in batch])
+        return judge(localiser, looks, places, t_s, self.swing, len(points), shows)
 
     # --- geometry -------------------------------------------------------------------------------------------------
 
@@ -544,25 +464,3 @@ class Known:
             back, seen = self.back.window(x0, y0, columns, rows, dx - round(dx), dy - round(dy))
             patch = Patch(patch.image, back, seen, patch.x_px - dx, patch.y_px - dy)
         return patch if self.shadow is None else self.shadow.cast(patch, guess)
-
-
-def _by_speed(
-    speed: np.ndarray, visible: np.ndarray, usual: float = 1.0
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """How much of the outline is to be seen at least, at two speeds (px/s): a rolling shutter shears it where the bob is fast,
-    and what is seen on nine frames of ten is not hidden."""
-    fast = speed > np.median(speed)
-    least = [
-        float(np.clip(np.percentile(visible[part], 10) - 0.05, 0.65 * usual, 0.85 * usual)) for part in (~fast, fast)
-    ]
-    return (float(np.median(speed[~fast])), float(np.median(speed[fast]))), (least[0], least[1])
-
-
-def _told_choice(tried: list[Trial], contrast: float) -> str:
-    return said(
-        "track.choice",
-        "An even disc does not explain the bob. What each localiser leaves unexplained of its contrast: {left}.",
-        left=", ".join(
-            f"{t.localiser.name} {t.misfit / max(contrast, 1.0):.0%}" for t in sorted(tried, key=lambda t: t.misfit)
-        ),
-    )
