@@ -50,9 +50,13 @@ ABOUT: dict[str, frozenset[str]] = {
             "calibrate.beside",
         }
     ),
-    "zero": frozenset({"track.strays", "track.apart", "track.rival", "calibrate.wide", "track.grows"}),
-    "scale": frozenset({"track.strays", "track.apart", "track.rival", "calibrate.wide"}),
-    "rest": frozenset({"track.strays", "track.grows", "track.clock_slips", "track.leaps", "video.backwards"}),
+    "zero": frozenset(
+        {"track.strays", "track.apart", "track.rival", "calibrate.wide", "calibrate.odd_view", "track.grows"}
+    ),
+    "scale": frozenset({"track.strays", "track.apart", "track.rival", "calibrate.wide", "calibrate.odd_view"}),
+    "rest": frozenset(
+        {"track.strays", "calibrate.odd_view", "track.grows", "track.clock_slips", "track.leaps", "video.backwards"}
+    ),
 }
 
 

@@ -24,7 +24,7 @@ from toolkit.track import LOST, PREDICTED, Track
 from toolkit.tracking.geometry.pivot import PivotEstimate, arc_pivot, line_pivot
 from toolkit.tracking.geometry.swing import start_swing
 from toolkit.tracking.geometry.view import View
-from toolkit.tracking.geometry.view_fit import Lines, fit_view
+from toolkit.tracking.geometry.view_fit import Lines, fit_view, out_of_the_ordinary
 
 __all__ = ["arc_pivot", "calibrate", "line_pivot", "write_calibration_json"]
 
@@ -146,6 +146,16 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
                 "Camera tilt not distinguishable from this clip: angles may be scaled by about {share:.1%} (assumed: a camera "
                 "within some 10° of square, or a phone's lens). A visible string and a larger swing would tell.",
                 share=found.scale_u_of_view,
+            )
+        )
+    odd = {} if view is None else out_of_the_ordinary(view)
+    if odd:
+        warnings.append(
+            said(
+                "calibrate.odd_view",
+                "only a camera, or a swing out of its plane, as is hardly ever met explains this clip ({effects}): its angles may be wrong "
+                "by more than their error bars say. Film square on to the swing, with the string in view, or give --pivot X,Y",
+                effects=", ".join(f"{name} {value:.3g}" for name, value in odd.items()),
             )
         )
     if view is not None and "bob" in view.shown:

@@ -31,6 +31,7 @@ PRIOR = {
     "factor": (1.0, 0.3), "yaw": (0.0, 0.2), "pitch": (0.0, 0.12), "log_nearness": (-0.7, 0.5), "k1": (0.0, 0.05),
     "sway_sin": (0.0, 0.05), "sway_cos": (0.0, 0.05), "readout": (0.0, 0.015),
 }  # fmt: skip
+_ORDINARY = 3.5  # of these deviations: hardly any camera is farther off (one effect of 2000)
 _TILTS = ((0.1, 0.05), (-0.1, 0.05), (0.1, -0.05), (-0.1, -0.05))
 _SWAYS = ((0.06, 0.0), (-0.06, 0.0), (0.0, 0.06), (0.0, -0.06))
 _POOR = 2.0  # times what σ and bent errors alone leave: then the view may be one of a wide ellipse
@@ -164,6 +165,14 @@ def fit_view(
         chosen.values, covariance, samples, weights, shown, model.middle_px, model.t0_s, problem.weaker, rows_along_x,
         modes[0].values,
     )  # fmt: skip
+
+
+def out_of_the_ordinary(view: View) -> dict[str, float]:
+    """Of the effects that a clip shows those that hardly any camera has, as `View.camera` names them: what the clip shows may be
+    something else."""
+    names = [name for group in view.shown for name in GROUPS[group]]
+    odd = {n for n in names if n in PRIOR and abs(view[n] - PRIOR[n][0]) > _ORDINARY * PRIOR[n][1]}
+    return {told: value for name, (told, value) in zip(names, view.camera().items()) if name in odd}
 
 
 def _names(shown: tuple[str, ...]) -> tuple[str, ...]:
