@@ -112,4 +112,6 @@ def _fit(
     return None if isnan(out[0]) else out
 
 
-LOCALISER = Localiser("disc", "least squares of a shaded disc with a soft edge and motion blur (default)", locate)
+LOCALISER = Localiser(
+    "disc", "least squares of a shaded disc with a soft edge and motion blur (default)", locate, circle=True
+)

@@ -297,4 +297,6 @@ def _likeliest(
     return result[:3], result[3:], apart
 
 
-LOCALISER = Localiser("edge", "likeliest outline before the background; for bobs with a pattern or a highlight", locate)
+LOCALISER = Localiser(
+    "edge", "likeliest outline before the background; for bobs with a pattern or a highlight", locate, circle=True
+)

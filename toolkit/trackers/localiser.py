@@ -105,8 +105,10 @@ NOWHERE = Place(np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Localiser:
-    """A way to find the bob's centre in a patch. `summary` is one sentence for the list of trackers."""
+    """A way to find the bob's centre in a patch. `summary` is one sentence for the list of trackers; one that takes the bob for a
+    `circle` sees its outline, any other the middle of what is like it."""
 
     name: str
     summary: str
     locate: Callable[[Patch, Look, Guess], Place]
+    circle: bool = False

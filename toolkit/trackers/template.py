@@ -57,4 +57,4 @@ def drawn(look: Look, wall: float) -> np.ndarray:
     return (wall + (look.contrast or -100.0) * disc_share(np.hypot(rows, columns), look)).astype(np.float32)
 
 
-LOCALISER = Localiser("template", "least-squares shift of the bob's mean picture", locate)
+LOCALISER = Localiser("template", "least-squares shift of the bob's mean picture", locate, circle=True)

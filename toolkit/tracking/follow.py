@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.trackers.disc import fit_disc
 from toolkit.trackers.localiser import NOWHERE, Guess, Patch, Place
-from toolkit.tracking.begin.learn import CIRCLES, Known
+from toolkit.tracking.begin.learn import Known
 from toolkit.tracking.begin.search import find_round_near
 from toolkit.tracking.begin.trail import Rough
 from toolkit.tracking.geometry.swing import CALM, fit_swing, start_swing
@@ -196,10 +196,9 @@ class Follower(Known):
         look = self.look
         sure = self.localiser.locate(patch, look, guess)
         self._outlined = sure.visible
-        round_bob = self.localiser.name in CIRCLES
         if (
             self.bold
-            or not round_bob
+            or not self.localiser.circle
             or (sure.visible >= self._least_visible() and 0.25 < sure.contrast / look.contrast < 4.0)
         ):
             return sure

@@ -27,10 +27,9 @@ _CHECK_EVERY = 12
 _SAMPLES = 20  # frames on which it is looked whether anything hides the bob
 _ENOUGH = 12  # frames
 _WAVERS = 0.02  # of the radius: what strays more from a swing may have a pattern up to its outline
-CIRCLES = "disc", "edge", "template"  # the localisers that take the bob to be round
 _LEAPS_PX = 0.3  # so far a camera that a hand holds makes any bob stray
 _ROUND = 0.75  # of the outline: of a bold pattern's less is to be seen now and then
-_HARDLY = 0.1  # of the outline of one with a bold pattern is seen at least
+_HARDLY = 0.1  # of the outline, at least, is seen of a bob with a bold pattern
 _CASTS = 2.5, 1.0, 1.0  # the bob's edge is so much softer as it is found with a shadow cast anew each time
 _LESS = 0.8  # of the misfit: by so much a bob with a pattern is explained better with a shadow
 
@@ -370,8 +369,8 @@ class Known:
     def _try_middles(self, looks: Looks, batch: list[Frame], points: dict[int, tuple[float, float]]) -> list[Trial]:
         """The localisers that take the middle of what is like the bob, where this is steady: parts of a pattern pull it, but circles
         that leap about lie on no round bob."""
-        names = (name for name in tracker_names() if name not in CIRCLES)
-        trials = (self._try(load_tracker(name), looks, batch, points, None) for name in names)
+        middles = (localiser for localiser in map(load_tracker, tracker_names()) if not localiser.circle)
+        trials = (self._try(localiser, looks, batch, points, None) for localiser in middles)
         return [t for t in trials if t is not None and t.swing.rms_px < STEADY * looks.look.radius_px]
 
     def _try(
