@@ -1,7 +1,8 @@
 """How well tracking does, on films with exact truth.
 
     python benchmarks/tracking.py accuracy            the conditions of the accuracy list, 720p, beside the Cramér–Rao bound
-    python benchmarks/tracking.py speed [VIDEO]       search, localiser, whole tracking beside decoding alone, by the clock and in CPU time; memory
+    python benchmarks/tracking.py speed [VIDEO]       search, localiser, whole tracking beside decoding alone, by the clock and in CPU time
+    python benchmarks/tracking.py memory [VIDEO]      the most memory that tracking 3 minutes of 1080p takes
     python benchmarks/tracking.py scenes [--count 216] [--first 0] [--jobs 2] [--keep FOLDER]
                                                       random scenes over all camera effects: locked, silent failures, σ
 
@@ -25,6 +26,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, fields
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -409,18 +411,31 @@ def _print_accuracy(o: Outcome, limit: float) -> None:
 # --- speed -----------------------------------------------------------------------------------------------------------
 
 
+_LARGE = {"width_px": 1920, "height_px": 1080, "px_per_m": 1500, "pivot_px": [961.9, 90.6]}
+
+
 def speed_films(folder: Path) -> list[Path]:
     """Films of 10 s of the accuracy list's pendulum: 720p and 1080p in H.264, and 720p in HEVC."""
-    large = {"width_px": 1920, "height_px": 1080, "px_per_m": 1500, "pivot_px": [961.9, 90.6]}
-    films = []
-    for name, codec, changes in (("720p", "h264", {}), ("1080p", "h264", large), ("720p", "hevc", {})):
-        film = folder / f"speed_{name}_{codec}.mp4"
-        if not film.exists():
-            rate = 12e6 if changes else 8e6
-            effects = {"sensor_noise": {"read_sigma": 2.0}, "codec": {"name": codec, "bit_rate_bit_per_s": rate}}
-            render(accuracy_scene({**effects, **changes}, {}, 10.0), film)
-        films.append(film)
-    return films
+    kinds: tuple[tuple[str, str, dict[str, Any]], ...] = (
+        ("720p", "h264", {}),
+        ("1080p", "h264", _LARGE),
+        ("720p", "hevc", {}),
+    )
+    return [_film(folder / f"speed_{name}_{codec}.mp4", codec, changes, 10.0) for name, codec, changes in kinds]
+
+
+def long_film(folder: Path) -> Path:
+    """The same pendulum for 3 minutes: 1080p, 30 frames a second."""
+    return _film(folder / "long_1080p_h264.mp4", "h264", {**_LARGE, "fps": 30}, 180.0)
+
+
+def _film(film: Path, codec: str, changes: Mapping[str, Any], duration_s: float) -> Path:
+    """Rendered unless it is there."""
+    if not film.exists():
+        rate = 12e6 if changes else 8e6
+        effects = {"sensor_noise": {"read_sigma": 2.0}, "codec": {"name": codec, "bit_rate_bit_per_s": rate}}
+        render(accuracy_scene({**effects, **changes}, {}, duration_s), film)
+    return film
 
 
 def decode_by_pyav(video: Path) -> None:
@@ -435,7 +450,7 @@ def decode_by_pyav(video: Path) -> None:
 
 
 def run_speed(video: Path, repeats: int = 7) -> None:
-    """Search, localiser a frame and whole tracking beside decoding alone; peak memory of this process so far.
+    """Search, localiser a frame and whole tracking beside decoding alone.
 
     Decoding alone is PyAV's with frame threads as they come, and that of our own reader, which has more threads at work. The
     time that passes is what a user waits for; CPU time is the sum over all processors. All are the least of `repeats` runs,
@@ -493,12 +508,22 @@ def run_speed(video: Path, repeats: int = 7) -> None:
             f"{used:.2f} in CPU time"
         )
     print("  limit: 0.90 of the rate of decoding alone")
-    try:
-        import resource
 
-        print(f"  peak memory so far        {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
-    except ImportError:
-        pass
+
+def run_memory(video: Path) -> None:
+    """The most memory that tracking a film takes, in a process of its own."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
+        frames, peak_mb = alone.submit(_peak_memory, video).result()
+    print(f"{video.name}: {frames} frames, {peak_mb:.0f} MB at most (limit 600 for 3 min of 1080p)")
+
+
+def _peak_memory(video: Path) -> tuple[int, float]:
+    """How many frames a film has, and the most memory (MB) of this process after tracking it."""
+    import resource  # not on Windows
+
+    frames = track(video).frame.size
+    unit = 2**20 if sys.platform == "darwin" else 2**10
+    return frames, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
 # --- summary ---------------------------------------------------------------------------------------------------------
@@ -555,8 +580,8 @@ def describe(o: Outcome) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
-    parser.add_argument("what", choices=["accuracy", "scenes", "speed"])
-    parser.add_argument("video", type=Path, nargs="?", help="for speed; by default three clips of 10 s are rendered")
+    parser.add_argument("what", choices=["accuracy", "memory", "scenes", "speed"])
+    parser.add_argument("video", type=Path, nargs="?", help="for speed and memory; by default clips are rendered")
     parser.add_argument("--count", type=int, default=8 * len(effect_names()))
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1, help="processes for scenes")
@@ -570,6 +595,9 @@ def main() -> None:
         if asked.what == "speed":
             for film in [asked.video] if asked.video else speed_films(folder):
                 run_speed(film)
+            return
+        if asked.what == "memory":
+            run_memory(asked.video or long_film(folder))
             return
         if asked.what == "accuracy":
             outcomes = [outcome for outcome, _ in run_accuracy(folder)]
