@@ -23,7 +23,10 @@ _PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 # 8-bit formats whose plane 0 is the luma itself
 _LUMA_FIRST = re.compile(r"^(yuvj?4\d\dp|yuva4\d\dp|nv12|nv21|nv16|gray|gray8)$")
 _DEEP_LUMA = re.compile(r"^(?:yuva?4\d\dp|gray)(9|10|12|14|16)le$")
-_MOST_AHEAD, _BYTES_AHEAD = 16, 2.5e7  # frames being decoded (the decoder's own limit), and the memory they may take
+
+# the decoder's own limit. One thread to a processor: with one more, ffmpeg's own choice, they wait for a processor as well as
+# for each other, and frames decoded far ahead drive each other out of the processor's caches
+_MOST_THREADS = 16
 
 
 class Frame:
@@ -183,7 +186,7 @@ def _decode_pyav(path: Path, rotation: int, fps: float | None, filtered: bool) -
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         stream.thread_type = "AUTO"
-        stream.codec_context.thread_count = _ahead(stream.width, stream.height)
+        stream.codec_context.thread_count = min(os.cpu_count() or 1, _MOST_THREADS)
         if not filtered:
             stream.codec_context.options = {**stream.codec_context.options, "skip_loop_filter": "bidir"}
         base = float(stream.time_base) if stream.time_base else 0.0
@@ -206,13 +209,6 @@ def _decode_pyav(path: Path, rotation: int, fps: float | None, filtered: bool) -
             upright = np.rot90(luma, turns) if turns else luma
             yield Frame(index, stamp - first, upright, _colour_of(picture, turns), int(picture.pict_type))
             index += 1
-
-
-def _ahead(width_px: int, height_px: int) -> int:
-    """How many frames are decoded at once: more than there are processors, so that they are at work while something else is
-    done with the frames, where that takes little memory."""
-    little = int(_BYTES_AHEAD / max(1.5 * width_px * height_px, 1.0))
-    return min(_MOST_AHEAD, max((os.cpu_count() or 1) + 1, little))
 
 
 def _luma(picture: Any) -> np.ndarray:

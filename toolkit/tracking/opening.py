@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain, islice
@@ -70,7 +69,7 @@ def _follow(video: Video, asked: Asked, opening: Opening, progress: Progress) ->
         return None
     follower, frames = begun
     expected = _expected_frames(video, asked.start_s, asked.stop_s)
-    for count, frame in enumerate(_some_at_once(frames)):
+    for count, frame in enumerate(frames):
         follower.follow(frame)
         if count % 64 == 0:
             progress("tracking", min(1.0, count / expected))
@@ -129,18 +128,6 @@ def begin(video: Video, asked: Asked, opening: Opening) -> tuple[Follower, Itera
     follower.interval_s /= opening.every
     follower.exposure_s = min(follower.exposure_s, follower.interval_s)
     return follower, _between(iter(video), asked.start_s, asked.stop_s)
-
-
-def _some_at_once(frames: Iterator[Frame], count: int = 16) -> Iterator[Frame]:
-    """The same frames, some decoded before the first of them is followed: both jobs go quicker where they do not drive each
-    other out of the processor's caches on every frame."""
-    held: deque[Frame] = deque()
-    while True:
-        held.extend(islice(frames, count))
-        if not held:
-            return
-        while held:
-            yield held.popleft()
 
 
 def _between(frames: Iterator[Frame], start_s: float | None, stop_s: float | None) -> Iterator[Frame]:
