@@ -24,7 +24,7 @@ from toolkit.track import LOST, PREDICTED, Track
 from toolkit.tracking.geometry.pivot import PivotEstimate, arc_pivot, line_pivot
 from toolkit.tracking.geometry.swing import start_swing
 from toolkit.tracking.geometry.view import View
-from toolkit.tracking.geometry.view_fit import Lines, fit_view, out_of_the_ordinary
+from toolkit.tracking.geometry.view_fit import PRIOR, Lines, fit_view, out_of_the_ordinary
 
 __all__ = ["arc_pivot", "calibrate", "line_pivot", "write_calibration_json"]
 
@@ -48,6 +48,9 @@ class _Angles:
     length_px: float
     scale_u: float
     scale_u_of_pivot: float
+    readout_s: float
+    readout_u_s: float
+    rows_by_angle: tuple[float, float]
     method: str
     shown: tuple[str, ...] = ()
 
@@ -56,12 +59,21 @@ class _Angles:
         """What of the scale's uncertainty is the camera's."""
         return float(np.sqrt(max(self.scale_u**2 - self.scale_u_of_pivot**2, 0.0)))
 
+    @property
+    def row_time_u_s(self) -> float:
+        """Standard uncertainty of the time in which the camera reads as many rows as the string is long."""
+        return self.readout_u_s * self.rows_by_angle[0]
+
 
 def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     """θ(t) of the measured frames (predicted and lost ones are left out), with σ.
 
     The σ of each frame is random; what is common to all is in the meta: `angle_scale_relative_u` (pivot along the
-    vertical; what the camera's tilt and lens may do, `angle_scale_relative_u_of_view`) and `vertical_sigma_rad`.
+    vertical; what the camera's tilt and lens may do, `angle_scale_relative_u_of_view`), `vertical_sigma_rad`, and
+    `row_time_u_s`, the uncertainty of the time in which the camera reads as many rows as the string is long: all times
+    share it times cos(θ − `row_direction_rad`). A delay that is the same at all angles is not counted: no fit can tell it
+    from φ. A delay moves θ one way or the other as the bob moves, tilt and lens move it alike both ways: so neither is the
+    other's, whatever readout, tilt and lens go together in the views that the clip allows.
     meta["calibration"] is the content of calibration.json.
     Raises JobError where too few frames were measured or times do not increase.
     """
@@ -90,6 +102,10 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
         "angle_scale_relative_u": found.scale_u,
         "angle_scale_relative_u_of_pivot": found.scale_u_of_pivot,
         "angle_scale_relative_u_of_view": found.scale_u_of_view,
+        "readout_s": found.readout_s,
+        "readout_u_s": found.readout_u_s,
+        "row_time_u_s": found.row_time_u_s,
+        "row_direction_rad": found.rows_by_angle[1],
         "length_px": found.length_px,
         "length_sigma_px": found.pivot_sigma_px[1],
         "fps": track.meta.get("fps"),
@@ -130,6 +146,14 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
             by_view=found.scale_u_of_view,
         ),
     ]
+    log.append(
+        said(
+            "calibrate.rows",
+            "Times are those at which the bob's row was read, with {readout_ms:.1f} ± {u_ms:.1f} ms from the first row to the last.",
+            readout_ms=1000 * found.readout_s,
+            u_ms=1000 * found.readout_u_s,
+        )
+    )
     if view is not None and view.shown:
         effects = ", ".join(f"{name} {value:.3g}" for name, value in view.camera().items())
         log.append(
@@ -183,6 +207,8 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
         "angle_scale_relative_u": found.scale_u,
         "angle_scale_relative_u_of_view": found.scale_u_of_view,
         "vertical_sigma_rad": found.vertical_sigma_rad,
+        "row_time_u_s": found.row_time_u_s,
+        "row_direction_rad": found.rows_by_angle[1],
         "exposure_s": track.meta.get("exposure_s"),
         "calibration": calibration,
     }
@@ -267,6 +293,9 @@ def _seen(
         view["length"],
         scale_u,
         min(scale_u_of_pivot, scale_u),
+        view.readout_s,
+        view.readout_u_s,
+        view.rows_by_angle(theta),
         arc if lines is None else said("pivot.both", "the arc and the string's lines together"),
         view.shown,
     )
@@ -296,6 +325,9 @@ def _plain(
     sigma = np.hypot(np.cos(direction) * sx, np.sin(direction) * sy) / distance
     middle = float(0.5 * (direction.max() + direction.min()))
     by_pivot = pivot.sigma_px[1] / length
+    seen = track.meta.get("view")
+    along_x = seen is not None and seen.rows_along_x
+    rows = float(track.meta.get("width_px", 2 * x.max()) if along_x else track.meta.get("height_px", 2 * y.max()))
     return _Angles(
         t,
         direction - middle,
@@ -307,6 +339,9 @@ def _plain(
         length,
         float(np.hypot(by_pivot, _VIEW_U)),
         by_pivot,
+        0.0,
+        PRIOR["readout"][1],
+        (length / rows, (0.5 * np.pi if along_x else 0.0) - middle),
         pivot.method,
     )
 

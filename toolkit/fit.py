@@ -76,6 +76,13 @@ class FitResult:
         """χ² per degree of freedom."""
         return self.chi2 / self.dof if self.dof > 0 else float("nan")
 
+    @property
+    def prior_chi2(self) -> float:
+        """What it costs that parameters left what was measured of them beforehand, Σ ((value − mean)/u)². χ² is of the points alone;
+        models are compared by both together."""
+        known = {} if self.problem is None else self.problem.priors
+        return float(sum(((self.parameters[name].value - mean) / u) ** 2 for name, (mean, u) in known.items()))
+
     def _repr_html_(self) -> str:
         from toolkit.report.notebook import fit_html
 
@@ -100,7 +107,8 @@ def fit(
     free : names to free that are held otherwise: `length` (held at the scene's), `f0`, `f`, `drive_phase` of a drive.
     fixed : name -> value to hold (`{"theta_offset": 0.0}`).    start : name -> first value, instead of the guess.
     priors : name -> standard uncertainty of what was measured beforehand: `angle_scale` and `time_scale` (relative),
-        `length` in m, `theta_offset` in rad. `angle_scale` comes from the series' meta where it is there.
+        `length` in m, `theta_offset` in rad, `row_time` in s. `angle_scale` and `row_time` come from the series' meta where
+        they are there.
     loss : "linear", or a robust one for outliers: "soft_l1", "huber", "cauchy".
     time_sigma_s : standard uncertainty of each time; it adds (σ_t θ̇)² to each σ².
     thorough : False takes the first start that converges, without looking whether the model then follows the record.
@@ -265,8 +273,8 @@ def _compared(fits: dict[str, FitResult]) -> dict[str, FitResult]:
         compared[name] = replace(
             result,
             chi2=chi2,
-            aic=chi2 / inflation2 + 2 * count,
-            bic=chi2 / inflation2 + count * math.log(effective),
+            aic=chi2 / inflation2 + result.prior_chi2 + 2 * count,
+            bic=chi2 / inflation2 + result.prior_chi2 + count * math.log(effective),
             noise={**result.noise, "comparison_inflation": math.sqrt(inflation2)},
         )
     return compared

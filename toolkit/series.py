@@ -26,7 +26,9 @@ class ThetaSeries:
     meta : where the data came from and all that was done to it. Keys in use: `source` (a sentence or a path),
         `log` (list of sentences, in the order done, for the methods section), `warnings` (list of sentences),
         `angle_scale_relative_u` (relative standard uncertainty common to all angles), `vertical_sigma_rad`,
-        `length_m`, `exposure_s`, `calibration` (the content of calibration.json).
+        `row_time_u_s` in s and `row_direction_rad` (σ and ψ of the common uncertainty σ cos(θ − ψ) of all times, where
+        the rows of a picture were read one after the other along the angle ψ), `length_m`, `exposure_s`, `calibration`
+        (the content of calibration.json).
 
     Raises UsageError where shapes differ, a value is not finite or absurd, times do not increase or a σ is not positive.
     """

@@ -61,8 +61,8 @@ class Evidence:
         return self.extra[model]
 
     def chi2(self, result: FitResult) -> float:
-        """χ² with this evidence's σ, divided by `inflation2`: differences of it are honest."""
-        return float(np.sum((result.residuals_rad / self.sigma_rad) ** 2)) / self.inflation2
+        """χ² with this evidence's σ, divided by `inflation2`, and of the priors: differences of it are honest."""
+        return float(np.sum((result.residuals_rad / self.sigma_rad) ** 2)) / self.inflation2 + result.prior_chi2
 
     def amplitude(self, t_s: np.ndarray | None = None) -> np.ndarray:
         """(n,) amplitude of the swing against time from the best fit, in rad: what its energy at t reaches."""

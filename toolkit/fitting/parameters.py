@@ -27,11 +27,12 @@ UNITS = {
     "drive_phase": "rad",
     "angle_scale": "1",
     "time_scale": "1",
+    "row_time": "s",
 }
 DRAGS = ("k_d", "alpha_d", "c", "beta", "torque", "mu")
 """Those that take energy out: never below zero."""
 
-NOT_GUESSED = ("theta_offset", "angle_scale", "time_scale", "f0", "f", "drive_phase")
+NOT_GUESSED = ("theta_offset", "angle_scale", "time_scale", "row_time", "f0", "f", "drive_phase")
 """Those that start from what is known beforehand, not from the record."""
 
 _FIRST = (*DRAGS, "theta0", "phi", "omega_g", "length", "theta_offset")

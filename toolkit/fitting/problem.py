@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from toolkit.series import ThetaSeries
 
 _LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
+_NUISANCES = ("angle_scale", "time_scale", "row_time")
+_IN_SERIES = {"angle_scale": "angle_scale_relative_u", "row_time": "row_time_u_s"}
+"""Where a series' meta gives their priors."""
 IMPOSSIBLE = 1e10
 """The residual of values that no motion belongs to."""
 
@@ -63,6 +66,17 @@ class Problem:
         """Scatter of a point about its neighbours, never zero."""
         return max(point_noise(self.series.theta_rad), 1e-12)
 
+    @cached_property
+    def row_lag(self) -> np.ndarray:
+        """By how much later each point was seen, for one unit of `row_time`: cos(θ − ψ) less that of the first, whose time stays.
+
+        `row_time` is the time, beyond what the series' times allow for, in which a camera reads as many rows as the string is
+        long, and ψ the direction in which it reads them, as an angle of the string. The measured angle tells the row well enough:
+        its noise moves a time by row_time·σ only.
+        """
+        turned = self.series.theta_rad - float(self.series.meta.get("row_direction_rad") or 0.0)
+        return np.asarray(np.cos(turned) - math.cos(turned[0]))
+
     def reduce(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
         """Reduced coefficients, and name -> {coefficient: derivative} for each reported name."""
         return reduce(values, self.scene, self.shift_s)
@@ -74,12 +88,16 @@ class Problem:
         names: Sequence[str] = (),
         rates: bool = True,
     ) -> Motion:
-        """The model at t_s (default: the points) with derivatives of θ and (`rates`) θ̇ by the reported `names`."""
+        """The model at t_s (default: the points, each when its row was read) with derivatives of θ and (`rates`) θ̇ by the reported
+        `names`."""
         times = self.t_s if t_s is None else t_s
         reduced, by = self.reduce(values)
         self._refuse_runaway(reduced, float(times[-1]))
         needed = list(dict.fromkeys(c for name in names for c in by.get(name, {})))
         stretched = times * (1 + values.get("time_scale", 0.0))
+        by_rows = t_s is None and "row_time" in values
+        if by_rows:
+            stretched = stretched + values["row_time"] * self.row_lag
         base = self.model.motion(reduced, stretched, needed, rates)
         d_theta = np.zeros((len(names), times.size)).T  # column by column in memory
         d_omega = np.zeros((len(names), times.size if rates else 0)).T
@@ -91,6 +109,8 @@ class Problem:
                     d_omega[:, i] += factor * base.d_omega[:, column]
             if name == "time_scale":
                 d_theta[:, i] = base.omega * times
+            elif name == "row_time" and by_rows:
+                d_theta[:, i] = base.omega * self.row_lag
         return Motion(base.theta, base.omega, d_theta, d_omega, base.method)
 
     def _refuse_runaway(self, reduced: Mapping[str, float], stop_s: float) -> None:
@@ -279,15 +299,14 @@ def pose(
         drive = check_parameters("cosine_drive", scene.effects["cosine_drive"])
         values |= {"f0": drive["f0_n"], "f": drive["f_hz"], "drive_phase": drive.get("phase_rad", 0.0)}
     told = dict(priors or {})
-    if priors is None or "angle_scale" not in told:
-        relative = series.meta.get("angle_scale_relative_u")
-        if relative:
-            told["angle_scale"] = float(relative)
+    for name, key in _IN_SERIES.items():
+        if name not in told and series.meta.get(key):
+            told[name] = float(series.meta[key])
     known: dict[str, tuple[float, float]] = {}
     for name, u in told.items():
         if not u > 0:
             raise UsageError(f"the prior of {name} must be a positive standard uncertainty, got {u}")
-        if name in ("angle_scale", "time_scale"):
+        if name in _NUISANCES:
             values[name] = 0.0
         elif name not in values:
             raise UsageError(f"no parameter {name!r} in {model}{did_you_mean(name, list(values))}")

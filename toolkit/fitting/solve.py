@@ -123,7 +123,8 @@ def _report(problem: Problem, found: Solved) -> FitResult:
         lmfit=found.lmfit,
         problem=problem,
     )
-    return replace(result, derived=derive(result, problem))
+    told = result.prior_chi2
+    return replace(result, aic=result.aic + told, bic=result.bic + told, derived=derive(result, problem))
 
 
 def _warnings(problem: Problem, found: Solved, values: Mapping[str, float]) -> list[Sentence]:

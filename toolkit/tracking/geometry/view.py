@@ -84,8 +84,28 @@ class View:
     def row_time(self, t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
         """When the bob's own row was exposed. Where the clip does not show a readout clearly it is the mean of what clip and prior
         allow (Bayes' estimate), not none: rows that are read at other times bend θ(t) as laws of drag do."""
-        readout = self["readout"] if "readout" in self.shown else float(self.weights @ self.samples[:, AT["readout"]])
-        return np.asarray(t_s + readout * self.rows(x_px, y_px))
+        return np.asarray(t_s + self.readout_s * self.rows(x_px, y_px))
+
+    @property
+    def readout_s(self) -> float:
+        """How much later the last row is exposed than the first, as `row_time` has it."""
+        return self["readout"] if "readout" in self.shown else float(self.weights @ self.samples[:, AT["readout"]])
+
+    @property
+    def readout_u_s(self) -> float:
+        """How far the views that the clip allows have the readout from the one used (rms)."""
+        return float(np.sqrt(self.weights @ (self.samples[:, AT["readout"]] - self.readout_s) ** 2))
+
+    def rows_by_angle(self, theta_rad: np.ndarray) -> tuple[float, float]:
+        """(a, ψ): at θ the bob is in the row a·cos(θ − ψ), up to a constant. ψ (rad) is the angle of a string that hangs along the
+        way rows are read, and a the string's length in picture heights."""
+        theta = np.linspace(theta_rad.min(), theta_rad.max(), _ANGLES_SHOWN)
+        still = self.values.copy()
+        still[[AT["sway_sin"], AT["sway_cos"]]] = 0.0
+        rows = self.rows(*self.see(still, theta, np.zeros_like(theta)))
+        design = np.column_stack([np.ones_like(theta), np.cos(theta), np.sin(theta)])
+        _, along, across = np.linalg.lstsq(design, rows)[0]
+        return float(np.hypot(along, across)), float(np.arctan2(across, along))
 
     def position(self, t_s: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the motion has the bob in the picture at stamps t_s; x_px, y_px tell its row."""
