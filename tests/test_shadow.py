@@ -59,6 +59,18 @@ def test_a_faint_shadow_that_hardly_shows_beside_an_even_bob_is_found():
     assert np.hypot(found.x_px + 0.05 * shadow[0], found.y_px + 0.05 * shadow[1]) < 0.1
 
 
+def test_a_shadow_is_found_though_something_passes_beside_the_bob():
+    # on three of eight patches stands what the wall does not show, and no shadow explains
+    shadow = (9.6, 1.2, 12.0, 5.4, 0.2)
+    patches = seen(shadow)
+    for k, (patch, _) in enumerate(patches[::3]):
+        patch.image[:, 84 + 6 * k :] = 60.0
+    found = find_shadow(patches, Look(12.0, 0.7, -98.0, 8.0))
+    assert found is not None
+    assert np.hypot(found.shadow.right_px - 9.6, found.shadow.down_px - 1.2) < 1.0
+    assert np.hypot(found.x_px, found.y_px) < 0.1
+
+
 def test_a_shadow_hardly_beside_a_soft_bob_is_found():
     """Nothing is dark beside it but a narrow rim, and the disc fits so well that only where it does not tells."""
     shadow = (-3.9, 0.8, 12.0, 2.2, 0.17)

@@ -91,7 +91,8 @@ def _growth(swing: Swing, t: np.ndarray) -> tuple[float, float]:
 
     def grown(values: np.ndarray) -> float:
         theta, rate = Swing(values, swing.covariance, swing.t0_s, swing.rms_px).angle(ends)
-        energy = 0.5 * rate**2 + values[4] * (1 - np.cos(theta))
+        with np.errstate(all="ignore"):  # of a motion beyond all numbers the growth is none
+            energy = 0.5 * rate**2 + values[4] * (1 - np.cos(theta))
         return 0.5 * float(np.log(max(energy[1], 1e-12) / max(energy[0], 1e-12)))
 
     now = grown(swing.values)

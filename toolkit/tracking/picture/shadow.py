@@ -26,7 +26,11 @@ _ABOUT_BOB = ((0.5, 1.0, 0.2), (1.3, 1.0, 0.2))
 _TAKEN_FOR_ONE = (0.6, 0.6, 0.5)
 # what the bob alone leaves is compared between parts of the picture: rings about it, of so many radii, in eight directions each
 _RINGS = (0.5, 0.8, 0.95, 1.05, 1.25, 1.6, 2.2)
+_DISTURBED = 3.0  # times what is left of most patches: of one with more something else is on it
 _UNEXPLAINED = 8.0  # times the scatter within such parts: more between them, and there is something beside the bob
+
+# of each: its place relative to the guess (two), the picture in the background's light, the background, and its patch's number
+_Pixels = tuple[np.ndarray, ...]
 
 
 class Shadow(NamedTuple):
@@ -86,10 +90,15 @@ class Shaded(NamedTuple):
 def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
     """The shadow beside the bob, by what is fitted to patches on which the bob is slow (each with the guess at its centre).
     None where the bob alone explains them nearly as well."""
-    u, v, image, back, which = _pixels(seen, look)
-    if u.size < 200:
+    pixels = _pixels(seen, look)
+    if pixels[0].size < 200:
         return None
-    alone = _fit(u, v, image, back, _alone(image, back, look), range(8), 12)
+    alone = _fit_alone(pixels, look)
+    undisturbed = _undisturbed(pixels, alone[0])
+    if not np.all(undisturbed):
+        pixels = tuple(each[undisturbed] for each in pixels)
+        alone = _fit_alone(pixels, look)
+    u, v, image, back, which = pixels
     if look.even and _unexplained(u, v, image - _model(alone[0], u, v, back), look.radius_px) < _UNEXPLAINED:
         return None
     found = _beside_even(u, v, image, back, which, look, alone)
@@ -118,6 +127,21 @@ def _fit(
 
     least = least_squares(rest, start, _STEPS, free, turns=turns)
     return (start, np.inf) if least is None else (least.values, least.chi2 / least.rest.size)
+
+
+def _fit_alone(pixels: _Pixels, look: Look) -> tuple[np.ndarray, float]:
+    """`_fit` of the bob without a shadow."""
+    u, v, image, back, _ = pixels
+    return _fit(u, v, image, back, _alone(image, back, look), range(8), 12)
+
+
+def _undisturbed(pixels: _Pixels, values: np.ndarray) -> np.ndarray:
+    """Which pixels are of a patch like most: of one on which something passes, the model leaves far more, and a shadow would not
+    show in the mean."""
+    u, v, image, back, which = pixels
+    rest = np.clip(image - _model(values, u, v, back), -3 * _CLEAR, 3 * _CLEAR)
+    left = np.bincount(which, rest**2) / np.maximum(np.bincount(which), 1)
+    return left[which] <= _DISTURBED * np.median(left[np.unique(which)])
 
 
 def _fit_in_place(
@@ -254,9 +278,7 @@ def _beside_patterned(u: np.ndarray, v: np.ndarray, image: np.ndarray, back: np.
     return Shaded(Shadow(sx - cx, sy - cy, shadow_px, abs(soft), strength), cx, cy, radius, 0.7, contrast)
 
 
-def _pixels(
-    seen: list[tuple[Patch, Guess]], look: Look
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _pixels(seen: list[tuple[Patch, Guess]], look: Look) -> _Pixels:
     """Some pixels of the patches but for the string: places relative to the guess, picture in the background's light, background,
     and which patch each is of."""
     bare = []
