@@ -70,6 +70,14 @@ def test_wrong_sigma_is_noticed():
     assert measured.sigma_rad == pytest.approx(3e-3, rel=0.1)
 
 
+def test_scatter_below_sigma_is_no_sign_that_what_returns_with_the_angle_is_small():
+    """σ² is 0.36 of scatter and 0.64 of errors that a fitted motion follows: only σ stated too large in both may shrink."""
+    x = 0.6 * np.random.default_rng(0).normal(size=800)
+    used = [noise.measure_noise(x, 1e-3, True, 4.4, 1 / 60, 5, common=c).scale_used for c in (0.0, 0.4, 0.8, 1.0)]
+    assert used == pytest.approx([0.6, math.hypot(0.6, 0.4), 1.0, 1.0], rel=0.05)
+    assert noise.measure_noise(5 * x, 1e-3, True, 4.4, 1 / 60, 5, common=0.8).scale_used == pytest.approx(3, rel=0.05)
+
+
 def test_spread_is_the_covariance_of_projections():
     n, rho = 300, 0.8
     t = np.arange(n)

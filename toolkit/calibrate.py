@@ -48,6 +48,7 @@ class _Angles:
     length_px: float
     scale_u: float
     scale_u_of_pivot: float
+    sigma_common_share: float
     readout_s: float
     readout_u_s: float
     rows_by_angle: tuple[float, float]
@@ -73,7 +74,8 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
     `row_time_u_s`, the uncertainty of the time in which the camera reads as many rows as the string is long: all times
     share it times cos(θ − `row_direction_rad`). A delay that is the same at all angles is not counted: no fit can tell it
     from φ. A delay moves θ one way or the other as the bob moves, tilt and lens move it alike both ways: so neither is the
-    other's, whatever readout, tilt and lens go together in the views that the clip allows.
+    other's, whatever readout, tilt and lens go together in the views that the clip allows. What tilt and lens may do beyond
+    zero and scale is in each frame's σ, though it is alike wherever the angle is: `sigma_common_share` says how much of σ it is.
     meta["calibration"] is the content of calibration.json.
     Raises JobError where too few frames were measured or times do not increase.
     """
@@ -102,6 +104,7 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
         "angle_scale_relative_u": found.scale_u,
         "angle_scale_relative_u_of_pivot": found.scale_u_of_pivot,
         "angle_scale_relative_u_of_view": found.scale_u_of_view,
+        "sigma_common_share": found.sigma_common_share,
         "readout_s": found.readout_s,
         "readout_u_s": found.readout_u_s,
         "row_time_u_s": found.row_time_u_s,
@@ -207,6 +210,7 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
         "angle_scale_relative_u": found.scale_u,
         "angle_scale_relative_u_of_view": found.scale_u_of_view,
         "vertical_sigma_rad": found.vertical_sigma_rad,
+        "sigma_common_share": found.sigma_common_share,
         "row_time_u_s": found.row_time_u_s,
         "row_direction_rad": found.rows_by_angle[1],
         "exposure_s": track.meta.get("exposure_s"),
@@ -293,6 +297,7 @@ def _seen(
         view["length"],
         scale_u,
         min(scale_u_of_pivot, scale_u),
+        float(np.sqrt(np.mean(other**2 / (random**2 + other**2)))),
         view.readout_s,
         view.readout_u_s,
         view.rows_by_angle(theta),
@@ -339,6 +344,7 @@ def _plain(
         length,
         float(np.hypot(by_pivot, _VIEW_U)),
         by_pivot,
+        0.0,
         0.0,
         PRIOR["readout"][1],
         (length / rows, (0.5 * np.pi if along_x else 0.0) - middle),

@@ -27,8 +27,8 @@ class ThetaSeries:
         `log` (list of sentences, in the order done, for the methods section), `warnings` (list of sentences),
         `angle_scale_relative_u` (relative standard uncertainty common to all angles), `vertical_sigma_rad`,
         `row_time_u_s` in s and `row_direction_rad` (σ and ψ of the common uncertainty σ cos(θ − ψ) of all times, where
-        the rows of a picture were read one after the other along the angle ψ), `length_m`, `exposure_s`, `calibration`
-        (the content of calibration.json).
+        the rows of a picture were read one after the other along the angle ψ), `sigma_common_share` (share of σ, rms, of
+        errors that return with the angle), `length_m`, `exposure_s`, `calibration` (the content of calibration.json).
 
     Raises UsageError where shapes differ, a value is not finite or absurd, times do not increase or a σ is not positive.
     """

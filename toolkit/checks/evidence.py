@@ -90,7 +90,8 @@ class Evidence:
         step = float(np.median(np.diff(self.series.t_s)))
         known = self.series.sigma_theta_rad is not None
         count = len(best.free) + columns.shape[1]
-        noise = measure_noise(left, self.sigma_rad, known, omega_g_of(best), step, count)
+        common = best.problem.common_share
+        noise = measure_noise(left, self.sigma_rad, known, omega_g_of(best), step, count, common=common)
         inflation2 = max(noise.inflation**2, 1e-30)
         gain = float(residual @ residual - left @ left) / inflation2
         u = np.sqrt(np.diag(inverse) * inflation2) / size

@@ -26,7 +26,7 @@ class Noise:
 
     sigma_rad : rms scatter of a point.    source : "series" (σ given) or "residuals" (σ estimated).
     scale : residual scatter over the σ that weighted the fit (1 where σ came from the residuals).
-    scale_used : the factor on error bars: 1 where the given σ agrees with the scatter.
+    scale_used : the factor on error bars: 1 where the given σ agrees with the scatter, or holds what scatter cannot show.
     rho1 : residual autocorrelation at one step.    durbin_watson, ljung_box_p, runs_z : tests of whiteness.
     white : True where they find nothing.    coefficients : of the autoregression that describes the residuals.
     inflation : √(S(ω)/σ²) at the pendulum's frequency: error bars over those for white noise of the σ used.
@@ -72,13 +72,15 @@ def measure_noise(
     step_s: float,
     free: int,
     jacobian: np.ndarray | None = None,
+    common: float = 0.0,
 ) -> Noise:
     """The noise from residuals divided by the σ used (`normalised`, (n,)).
 
     known : whether σ came with the series.    omega : the pendulum's, rad/s.    step_s : typical time between points.
     free : number of fitted parameters.    jacobian : (n, k) derivatives over σ; with it what the fit took out of correlated
     noise is put back. The residuals of a fit are poorest where the fit listens, at the pendulum's frequency, and short
-    records of slow noise would else get error bars too small by a tenth.
+    records of slow noise would else get error bars too small by a tenth.    common : what share of a given σ (rms) is of errors
+    that return with the angle: the motion that is fitted follows them, so that scatter below σ is no sign that they are small.
     """
     n = normalised.size
     dof = max(n - free, 1)
@@ -102,6 +104,8 @@ def measure_noise(
         alike = float(np.mean(power**2) / np.mean(power) ** 2)  # Σ ρ²: so many points tell the variance as one
     agrees = abs(scale**2 - 1) < 4 * math.sqrt(2 * alike / dof)
     used = 1.0 if known and agrees else scale
+    if known and used < 1:
+        used = min(math.hypot(used, common), 1.0)
     inflation = used * math.sqrt(spectrum(coefficients, omega * step_s))
     return Noise(
         sigma_rad=sigma,

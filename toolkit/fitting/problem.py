@@ -66,6 +66,11 @@ class Problem:
         """Scatter of a point about its neighbours, never zero."""
         return max(point_noise(self.series.theta_rad), 1e-12)
 
+    @property
+    def common_share(self) -> float:
+        """What share of σ is of errors that return with the angle."""
+        return float(self.series.meta.get("sigma_common_share") or 0.0)
+
     @cached_property
     def row_lag(self) -> np.ndarray:
         """By how much later each point was seen, for one unit of `row_time`: cos(θ − ψ) less that of the first, whose time stays.

@@ -92,7 +92,9 @@ def _report(problem: Problem, found: Solved) -> FitResult:
     reduced, _ = problem.reduce(values)
     step = float(np.median(np.diff(problem.t_s)))
     jacobian = by / sigma[:, None]
-    noise = measure_noise(normalised, sigma, problem.sigma_known, reduced["omega_g"], step, k, jacobian)
+    noise = measure_noise(
+        normalised, sigma, problem.sigma_known, reduced["omega_g"], step, k, jacobian, problem.common_share
+    )
     covariance, singular = _covariance(problem, jacobian, noise)
     parameters = {}
     for name, value in values.items():

@@ -21,6 +21,7 @@ _SHARED = (
     "angle_scale_relative_u",
     "angle_scale_relative_u_of_view",
     "vertical_sigma_rad",
+    "sigma_common_share",
     "row_time_u_s",
     "row_direction_rad",
 )
