@@ -31,6 +31,7 @@ __all__ = ["arc_pivot", "calibrate", "line_pivot", "write_calibration_json"]
 _CLICK_SIGMA_PX = 1.0
 _ODD_PX = 0.3  # arc and string disagree by so much for reasons of their own (a string's shading, the bob's shadow)
 _VIEW_U = 0.01  # where no view could be fitted: a camera some 8° off square (1 − cos 8°), or a phone's uncorrected lens
+_BESIDE_PX = 0.1  # a share of a pixel that the user need not hear of, however clearly it shows
 _WIDE_U = 0.08  # an uncertainty of all angles that the user must hear of
 
 
@@ -185,13 +186,14 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
                 effects=", ".join(f"{name} {value:.3g}" for name, value in odd.items()),
             )
         )
-    if view is not None and "bob" in view.shown:
+    off_px = 0.0 if view is None or "bob" not in view.shown else float(np.hypot(view["off_x"], view["off_y"]))
+    if off_px > _BESIDE_PX:
         warnings.append(
             said(
                 "calibrate.beside",
                 "string and arc tell that the bob was found about {off_px:.1f} px beside its centre on all frames (a shadow or a "
                 "highlight taken for part of it?): the angles allow for it, the places in track.csv do not",
-                off_px=float(np.hypot(view["off_x"], view["off_y"])),
+                off_px=off_px,
             )
         )
     if found.scale_u > _WIDE_U:
