@@ -130,8 +130,8 @@ def test_the_rows_of_a_turned_camera(along_x, psi):
     assert (view.readout_s, view.readout_u_s) == pytest.approx((0.012, 0.002))
 
 
-def seen_through_a_camera(seed: int) -> ThetaSeries:
-    """12 s of a bob with linear drag, before a camera as the priors have them: exact places with noise, the string's lines."""
+def seen_through_a_camera(seed: int, c_kg_per_m: float = 0.0) -> ThetaSeries:
+    """12 s of a bob, before a camera as the priors have them: exact places with noise, the string's lines."""
     rng = np.random.default_rng(seed)
     yaw, pitch, k1, sway = rng.normal(0, (0.12, 0.08, 0.02, 0.02))
     readout = float(np.clip(abs(rng.normal(0, 0.015)), 1e-3, 0.03))
@@ -150,7 +150,7 @@ def seen_through_a_camera(seed: int) -> ThetaSeries:
     table = {
         "pendulum": {"mass_kg": 0.1, "length_m": 0.6, "bob_radius_m": 0.02},
         "release": {"theta0_rad": theta0},
-        "effects": {"linear_drag": {"k_d_kg_per_s": 1e-3}},
+        "effects": {"linear_drag": {"k_d_kg_per_s": 1e-3}, "quadratic_drag": {"c_kg_per_m": c_kg_per_m}},
         "camera": camera,
     }
     studio = stage(Scene.from_dict(table))
@@ -175,6 +175,10 @@ def test_cameras_of_all_kinds_are_not_taken_for_another_law_of_drag():
         untold.append(judged(replace(series, meta=bare)).evidence["p_value"])
     assert np.sum(np.array(told) < 0.01) <= 2
     assert np.sum(np.array(untold) < 0.01) >= 4
+
+
+def test_quadratic_drag_is_found_through_cameras_of_all_kinds():
+    assert [judged(seen_through_a_camera(seed, 4e-3)).verdict for seed in range(5)] == ["fails"] * 5
 
 
 @pytest.fixture(scope="module")
