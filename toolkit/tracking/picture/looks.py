@@ -228,7 +228,8 @@ def _exposure(
     cost = np.full((trials.size, fast.size), np.nan)
     looks = [grown(learned.look, learned.growth, x) for x in seen.x_px[fast].tolist()]
     tried: set[int] = set()
-    wanted = {0, 3, 6} if about_s is None else {round(10 * about_s / interval_s)}
+    # so close that one lies a little below the right one: too long a streak fits about as badly whatever its length
+    wanted = {0, 2, 4, 6} if about_s is None else {round(10 * about_s / interval_s)}
     while wanted - tried:  # until what is best has no untried neighbour
         for j in sorted(wanted - tried):
             for n, k in enumerate(fast.tolist()):
