@@ -3,7 +3,7 @@
     python benchmarks/tracking.py accuracy            the conditions of the accuracy list, 720p, beside the Cramér–Rao bound
     python benchmarks/tracking.py speed [VIDEO]       search, localiser, whole tracking beside decoding alone, by the clock and in CPU time
     python benchmarks/tracking.py memory [VIDEO]      the most memory that tracking 3 minutes of 1080p takes
-    python benchmarks/tracking.py scenes [--count 216] [--first 0] [--jobs 2] [--keep FOLDER]
+    python benchmarks/tracking.py scenes [--count 200] [--first 0] [--jobs 1] [--keep FOLDER]
                                                       random scenes over all camera effects: locked, silent failures, σ
 
 Every scene is random by its number alone, so a failure is named by a number. A clip is
@@ -452,9 +452,9 @@ def decode_by_pyav(video: Path) -> None:
 def run_speed(video: Path, repeats: int = 7) -> None:
     """Search, localiser a frame and whole tracking beside decoding alone.
 
-    Decoding alone is PyAV's with frame threads as they come, and that of our own reader, which has more threads at work. The
-    time that passes is what a user waits for; CPU time is the sum over all processors. All are the least of `repeats` runs,
-    in turn.
+    Decoding alone is PyAV's with frame threads as they come, and that of our own reader, which has one thread to a processor.
+    The time that passes is what a user waits for; CPU time is the sum over all processors. All are the least of `repeats`
+    runs, in turn.
     """
     from toolkit.trackers import load_tracker
     from toolkit.tracking.begin.acquire import find_clear_bob
