@@ -93,13 +93,13 @@ def find_shadow(seen: list[tuple[Patch, Guess]], look: Look) -> Shaded | None:
     pixels = _pixels(seen, look)
     if pixels[0].size < 200:
         return None
-    alone = _fit_alone(pixels, look)
-    undisturbed = _undisturbed(pixels, alone[0])
+    alone, rest = _fit_alone(pixels, look)
+    undisturbed = _undisturbed(rest, pixels[-1])
     if not np.all(undisturbed):
         pixels = tuple(each[undisturbed] for each in pixels)
-        alone = _fit_alone(pixels, look)
+        alone, rest = _fit_alone(pixels, look)
     u, v, image, back, which = pixels
-    if look.even and _unexplained(u, v, image - _model(alone[0], u, v, back), look.radius_px) < _UNEXPLAINED:
+    if look.even and _unexplained(u, v, rest, look.radius_px) < _UNEXPLAINED:
         return None
     found = _beside_even(u, v, image, back, which, look, alone)
     return found or (_beside_patterned(u, v, image, back, look) if look.even else None)
@@ -129,18 +129,18 @@ def _fit(
     return (start, np.inf) if least is None else (least.values, least.chi2 / least.rest.size)
 
 
-def _fit_alone(pixels: _Pixels, look: Look) -> tuple[np.ndarray, float]:
-    """`_fit` of the bob without a shadow."""
+def _fit_alone(pixels: _Pixels, look: Look) -> tuple[tuple[np.ndarray, float], np.ndarray]:
+    """`_fit` of the bob without a shadow, and what it leaves of each pixel, grey levels."""
     u, v, image, back, _ = pixels
-    return _fit(u, v, image, back, _alone(image, back, look), range(8), 12)
+    alone = _fit(u, v, image, back, _alone(image, back, look), range(8), 12)
+    return alone, image - _model(alone[0], u, v, back)
 
 
-def _undisturbed(pixels: _Pixels, values: np.ndarray) -> np.ndarray:
-    """Which pixels are of a patch like most: of one on which something passes, the model leaves far more, and a shadow would not
-    show in the mean."""
-    u, v, image, back, which = pixels
-    rest = np.clip(image - _model(values, u, v, back), -3 * _CLEAR, 3 * _CLEAR)
-    left = np.bincount(which, rest**2) / np.maximum(np.bincount(which), 1)
+def _undisturbed(rest: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Which pixels are of a patch like most: of one on which something passes, the model leaves far more (`rest`, grey levels), and a
+    shadow would not show in the mean."""
+    tame = np.clip(rest, -3 * _CLEAR, 3 * _CLEAR)
+    left = np.bincount(which, tame**2) / np.maximum(np.bincount(which), 1)
     return left[which] <= _DISTURBED * np.median(left[np.unique(which)])
 
 
