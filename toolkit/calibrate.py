@@ -149,17 +149,15 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
             by_pivot=found.scale_u_of_pivot,
             by_view=found.scale_u_of_view,
         ),
-    ]
-    log.append(
         said(
             "calibrate.rows",
             "Times are those at which the bob's row was read, with {readout_ms:.1f} ± {u_ms:.1f} ms from the first row to the last.",
             readout_ms=1000 * found.readout_s,
             u_ms=1000 * found.readout_u_s,
-        )
-    )
+        ),
+    ]
     if view is not None and view.shown:
-        effects = ", ".join(f"{name} {value:.3g}" for name, value in view.camera().items())
+        effects = _listed(view.camera())
         log.append(
             said(
                 "calibrate.camera",
@@ -183,7 +181,7 @@ def calibrate(track: Track, scene: Scene | None = None) -> ThetaSeries:
                 "calibrate.odd_view",
                 "only a camera, or a swing out of its plane, as is hardly ever met explains this clip ({effects}): its angles may be wrong "
                 "by more than their error bars say. Film square on to the swing, with the string in view, or give --pivot X,Y",
-                effects=", ".join(f"{name} {value:.3g}" for name, value in odd.items()),
+                effects=_listed(odd),
             )
         )
     off_px = 0.0 if view is None or "bob" not in view.shown else float(np.hypot(view["off_x"], view["off_y"]))
@@ -272,6 +270,10 @@ def _view(
     strays = np.hypot(x - mx, y - my) > np.maximum(0.1, 3 * np.hypot(sx, sy))  # else one side was hidden, no more
     driven = not known.shown and abs(off) > 0.3 * float(np.ptp(direction)) and strays.mean() > 0.3
     return None if driven else known
+
+
+def _listed(effects: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.3g}" for name, value in effects.items())
 
 
 def _seen(
