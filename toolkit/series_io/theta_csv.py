@@ -63,7 +63,7 @@ def read(path: Path) -> ThetaSeries:
 def _calibration(path: Path) -> dict[str, Any]:
     """The content of the calibration.json that was written with this theta.csv; empty where there is none."""
     if path.name == _FILE:
-        with suppress(OSError, ValueError):
+        with suppress(OSError, ValueError, RecursionError):
             content = json.loads((path.parent / _CALIBRATION).read_text(encoding="utf-8"))
             return content if isinstance(content, dict) else {}
     return {}
